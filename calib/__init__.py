@@ -1,0 +1,1 @@
+"""The mathematics: mechanisms, identification, discovery. Pure functions over small records."""

@@ -1,0 +1,1 @@
+"""Any mechanism from one description: kinematics, error Jacobians and limits, all derived."""

@@ -1,0 +1,1 @@
+"""Hardware links: CANopen controllers, emScon laser trackers, serial controllers."""

@@ -1,0 +1,210 @@
+"""What the routines ask of any motion controller and any laser tracker.
+
+Units: mm, rad, s, kg, deg C. Every coroutine here ends before a deadline of its own, with an
+answer or with a :class:`drivers.errors.DeviceError`. Deadlines run on wall time.
+"""
+
+from collections.abc import AsyncIterator, Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Who answers: compared with the site file at connect and written to every journal."""
+
+    kind: str
+    vendor: str = ""
+    product: str = ""
+    serial: str = ""
+    firmware: str = ""
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """Something that a device said unasked (EMCY, tracker event, heartbeat lost)."""
+
+    device: str
+    what: str
+    remedy: str = ""
+    fault: bool = False
+
+
+@dataclass(frozen=True)
+class ActuatorState:
+    """One actuator as its drive reports it; ``position`` and ``target`` in q units."""
+
+    name: str
+    position: float
+    target: float
+    state: str
+    moving: bool
+    homed: bool
+    fault: str = ""
+
+
+@dataclass(frozen=True)
+class ControllerState:
+    """A snapshot of the machine for the screens and the journal."""
+
+    actuators: tuple[ActuatorState, ...]
+    moving: bool
+    enabled: bool
+    channels: Mapping[str, float] = field(default_factory=dict)
+
+
+class MotionController(Protocol):
+    """A controller that holds kinematic parameters and moves the machine with them.
+
+    Parameter names are those of the machine file (``leg1.B_x``); compensation values carry the
+    names of the effects that they compensate (``screw-pitch.leg1``, ``backlash.leg1``).
+    """
+
+    identity: Identity
+
+    def on_alarm(self, callback: Callable[[Alarm], None]) -> None:
+        """Call ``callback`` in the event loop for everything said unasked."""
+
+    def check(self) -> None:
+        """Raise the fault that is standing (link lost, heartbeat lost, drive fault), if any."""
+
+    async def state(self) -> ControllerState:
+        """Read a snapshot."""
+
+    async def enable(self) -> None:
+        """Bring all drives to operation enabled."""
+
+    async def disable(self) -> None:
+        """Take the power off all drives."""
+
+    async def clear_faults(self) -> None:
+        """Reset standing faults; motion stays disabled until :meth:`enable`."""
+
+    async def home(self, actuator: str) -> None:
+        """Run one actuator's homing."""
+
+    async def jog(self, actuator: str, q: float) -> None:
+        """Move one actuator alone to ``q`` and wait until it is there."""
+
+    async def move_to_pose(self, pose: tuple[float, ...]) -> tuple[float, ...]:
+        """Command a pose and start moving: x, y, z in mm; alpha, beta, gamma in rad.
+
+        R = Rz(gamma) Ry(beta) Rx(alpha). Returns the actuator targets q that the controller
+        computed with the parameters that it holds. Raises Refused if outside its limits.
+        """
+
+    async def move_to_q(self, q: tuple[float, ...]) -> None:
+        """Command all actuators together and start moving."""
+
+    async def wait_arrived(self, timeout: float) -> None:
+        """Wait until every drive reports its target reached; ``timeout`` in wall seconds."""
+
+    async def stop(self) -> None:
+        """Quick stop, at any moment and from any state; never raises for a second call."""
+
+    async def read_parameters(self) -> dict[str, float]:
+        """Read every kinematic and compensation parameter that the controller uses now."""
+
+    async def write_parameters(self, values: Mapping[str, float]) -> None:
+        """Write to volatile memory; the controller uses them at once. Motion must be disabled."""
+
+    async def parameter_checksum(self) -> int:
+        """CRC-32 that the controller computes over the parameters that it uses now."""
+
+    async def store_parameters(self) -> None:
+        """Make the volatile parameters survive a power cycle."""
+
+    async def reload_parameters(self) -> None:
+        """Bring the stored parameters back into use."""
+
+    async def channels(self) -> dict[str, float]:
+        """State readings of the machine: ``structure_temp_C``, ``payload_kg`` and others."""
+
+    async def close(self) -> None:
+        """Release the link; never raises."""
+
+
+@dataclass(frozen=True)
+class TrackerReading:
+    """The mean of one dwell: SMR centre in the tracker frame (mm), with its uncertainty.
+
+    ``covariance`` holds xx, yy, zz, xy, xz, yz of the mean in mm^2.
+    """
+
+    xyz: tuple[float, float, float]
+    covariance: tuple[float, float, float, float, float, float]
+    temperature_C: float
+    pressure_hPa: float
+    humidity: float
+
+
+@dataclass(frozen=True)
+class TrackSample:
+    """One sample of the continuous mode: device time in s, SMR centre in mm."""
+
+    time_s: float
+    xyz: tuple[float, float, float]
+    valid: bool
+
+
+@dataclass(frozen=True)
+class TrackerState:
+    """What the tracker says of itself."""
+
+    initialized: bool
+    ready: bool
+    locked: bool
+    laser_warm: bool
+    reflector: str
+    face: int
+
+
+class Tracker(Protocol):
+    """A laser tracker that follows an SMR."""
+
+    identity: Identity
+
+    def on_alarm(self, callback: Callable[[Alarm], None]) -> None:
+        """Call ``callback`` in the event loop for everything said unasked."""
+
+    def check(self) -> None:
+        """Raise the fault that is standing, if any."""
+
+    async def state(self) -> TrackerState:
+        """Read a snapshot."""
+
+    async def initialize(self) -> None:
+        """Set units (mm, rad, deg C, hPa), right-handed xyz, environment; initialise if needed."""
+
+    async def reflectors(self) -> dict[str, int]:
+        """Name and identifier of every reflector that the tracker knows."""
+
+    async def select_reflector(self, name: str) -> None:
+        """Choose the reflector type; raises Refused if the tracker does not know it."""
+
+    async def point_at(self, xyz: tuple[float, float, float]) -> None:
+        """Drive the beam to a point and lock on the SMR there; raises NoTarget."""
+
+    async def find_reflector(self, distance_mm: float) -> None:
+        """Search around the present direction; raises NoTarget."""
+
+    async def go_birdbath(self) -> None:
+        """Drive the beam to the home reflector."""
+
+    async def measure(self, dwell_s: float) -> TrackerReading:
+        """Measure stationary for ``dwell_s`` of device time; raises BeamBroken, NotReady."""
+
+    def stream(self, separation_s: float) -> AsyncIterator[TrackSample]:
+        """Yield continuous-mode samples until the iterator is closed; raises BeamBroken."""
+
+    async def channels(self) -> dict[str, float]:
+        """Object temperature (``structure_temp_C``) and meteo (``air_temp_C``, ...)."""
+
+    async def change_face(self) -> None:
+        """Turn to the other face, for the two-face check."""
+
+    async def stop(self) -> None:
+        """End any measurement; never raises for a second call."""
+
+    async def close(self) -> None:
+        """Release the link; never raises."""

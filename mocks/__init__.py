@@ -1,0 +1,1 @@
+"""Machines that behave like real ones, in processes of their own, on real wires."""
