@@ -1,0 +1,68 @@
+"""How a verb answers: data on standard output, talk on standard error."""
+
+import json
+import math
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, TypeVar
+
+import click
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def json_option(function: _Function) -> _Function:
+    """Give a verb ``--json``; it arrives as the argument ``as_json``."""
+    return click.option(
+        "--json", "as_json", is_flag=True, help="Answer with one JSON object on standard output."
+    )(function)
+
+
+def show(data: Mapping[str, Any], as_json: bool, text: str) -> None:
+    """Print ``data`` as one JSON object, or ``text`` for a person."""
+    if as_json:
+        print_json(data)
+    else:
+        click.echo(text)
+
+
+def print_json(data: Mapping[str, Any]) -> None:
+    """Print one JSON object; numbers that are not finite become null, as JSON has no others."""
+    click.echo(json.dumps(_finite(data), ensure_ascii=False))
+
+
+def say(text: str) -> None:
+    """Tell the operator something that is not the answer."""
+    click.echo(text, err=True)
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Lay out a table in plain text: first column to the left, numbers to the right."""
+    lines = [list(header), *[list(row) for row in rows]]
+    widths = [max(len(line[column]) for line in lines) for column in range(len(header))]
+    text = []
+    for line in lines:
+        cells = [line[0].ljust(widths[0])]
+        cells += [cell.rjust(width) for cell, width in zip(line[1:], widths[1:], strict=True)]
+        text.append("  ".join(cells).rstrip())
+    return "\n".join(text)
+
+
+def interactive() -> bool:
+    """Whether a person is there to answer a question."""
+    return sys.stdin.isatty() and sys.stderr.isatty()
+
+
+def _finite(value: Any) -> Any:
+    """Replace what JSON cannot say, all the way down; numpy numbers and arrays become plain."""
+    if isinstance(value, Mapping):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, str) or value is None or isinstance(value, bool):
+        return value
+    if hasattr(value, "tolist"):
+        return _finite(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Iterable):
+        return [_finite(item) for item in value]
+    return value

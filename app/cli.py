@@ -1,0 +1,129 @@
+"""The command line: one verb for each of the operator's tasks, loaded only when it is asked for."""
+
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import click
+
+from app.errors import GateRefused, StoppedByOperator
+from calib.errors import BadInput
+from drivers.errors import DeviceError
+
+VERBS = Path(__file__).parent / "verbs"
+
+# The order in which an operator works; it is the order of ``pkmcal --help``.
+TASKS = (
+    ("Know the machine", ("machine", "poses", "design", "sensitivity", "identifiability")),
+    ("Measure", ("measure", "resume")),
+    ("Identify", ("fit", "compare")),
+    ("Find what the model misses", ("diagnose", "discover")),
+    ("Correct and prove it", ("apply", "undo", "verify", "iso9283", "report")),
+    ("Without hardware", ("demo", "mock", "simulate", "reproduce")),
+)
+
+EXIT_BAD_INPUT = 2
+EXIT_DEVICE = 3
+EXIT_STOPPED = 4
+EXIT_REFUSED = 5
+
+
+class Verbs(click.Group):
+    """Verbs found by their file names in ``app/verbs`` and imported when they are called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Every verb there is, in working order."""
+        there = {path.stem for path in VERBS.glob("*.py") if not path.stem.startswith("_")}
+        ordered = [verb for _, verbs in TASKS for verb in verbs if verb in there]
+        return ordered + sorted(there - set(ordered))
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import one verb."""
+        if cmd_name not in self.list_commands(ctx):
+            return None
+        command: click.Command = import_module(f"app.verbs.{cmd_name}").command
+        command.name = cmd_name
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the verbs by task, without importing any of them."""
+        left = self.list_commands(ctx)
+        for task, verbs in (*TASKS, ("Other", tuple(left))):
+            here = [verb for verb in verbs if verb in left]
+            left = [verb for verb in left if verb not in here]
+            if here:
+                with formatter.section(task):
+                    formatter.write_dl([(verb, _says(verb)) for verb in here], col_max=16)
+
+
+def _says(verb: str) -> str:
+    """First line of a verb's docstring, read without importing it."""
+    with (VERBS / f"{verb}.py").open(encoding="utf-8") as source:
+        return source.readline().strip().strip('"').rstrip(".")
+
+
+@click.command(
+    cls=Verbs,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+@click.version_option(package_name="pkmcal")
+@click.pass_context
+def pkmcal(context: click.Context) -> None:
+    """Calibrate parallel-kinematic machines: measure, identify, correct, verify.
+
+    Without a verb, the screens open.
+
+    Exit codes: 0 answered, 2 bad input or usage, 3 hardware fault, 4 stopped by the operator,
+    5 refused by a safety gate.
+    """
+    if context.invoked_subcommand is None:
+        try:
+            screens: Any = import_module("app.tui")
+            run = screens.run
+        except (ModuleNotFoundError, AttributeError):
+            raise BadInput(
+                "the screens are not part of this installation",
+                remedy="Use the verbs: pkmcal --help lists them",
+            ) from None
+        run()
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and end the process with the exit code of how the job ended."""
+    sys.exit(run(arguments))
+
+
+def run(arguments: list[str] | None = None) -> int:
+    """Run the command line; everything foreseen becomes a message and an exit code."""
+    try:
+        code = pkmcal.main(args=arguments, prog_name="pkmcal", standalone_mode=False)
+    except click.exceptions.Exit as done:
+        return done.exit_code
+    except click.ClickException as wrong:
+        wrong.show()
+        return EXIT_BAD_INPUT
+    except BadInput as wrong:
+        return _end(wrong, EXIT_BAD_INPUT)
+    except DeviceError as fault:
+        return _end(fault, EXIT_DEVICE)
+    except StoppedByOperator as stopped:
+        return _end(stopped, EXIT_STOPPED)
+    except (click.Abort, KeyboardInterrupt):
+        return _end(StoppedByOperator(), EXIT_STOPPED)
+    except GateRefused as refused:
+        return _end(refused, EXIT_REFUSED)
+    except OSError as wrong:
+        if wrong.filename is None:
+            raise
+        return _end(BadInput(wrong.strerror or str(wrong), place=str(wrong.filename)), 2)
+    return code if isinstance(code, int) else 0
+
+
+def _end(error: Exception, code: int) -> int:
+    """Say why the program ends."""
+    words = {2: "bad input", 3: "hardware fault", 4: "stopped", 5: "refused"}[code]
+    text = str(error)
+    click.echo(f"pkmcal: {words}: {text}" if text else f"pkmcal: {words}", err=True)
+    return code
