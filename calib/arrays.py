@@ -1,0 +1,12 @@
+"""The array types of the mathematics."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+IntArray = npt.NDArray[np.intp]
+Numbers = npt.NDArray[Any]
+"""Real, or complex where a derivative is checked by complex step."""
