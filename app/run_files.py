@@ -1,0 +1,138 @@
+"""Reading and writing runs and machine files on disk."""
+
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+from calib.errors import BadInput
+from calib.mechanism.description import Machine
+from calib.mechanism.parse import parse_machine
+from calib.runs import Run, format_run, parse_header, parse_run
+
+HEADER = "run.toml"
+POINTS = "points.csv"
+
+
+@dataclass(frozen=True)
+class LoadedRun:
+    """A run with the machine on which it was taken and the folder from which it came."""
+
+    folder: Path
+    run: Run
+    machine: Machine
+
+
+def shipped_machines() -> list[str]:
+    """Names of the machines that come with the program."""
+    folder = resources.files("calib") / "machines"
+    return sorted(
+        entry.name.removesuffix(".toml")
+        for entry in folder.iterdir()
+        if entry.name.endswith(".toml")
+    )
+
+
+def load_machine(name: str, *, beside: Path | None = None, place: str = "") -> Machine:
+    """Read a machine that ships with the program, or the file at a path.
+
+    Parameters
+    ----------
+    name : str
+        ``"hexapod"``, or a path; relative paths start at the folder ``beside``.
+    beside : Path, optional
+        The run's folder; the working directory if left out.
+    place : str, optional
+        Where the name stands, for the error message.
+
+    Raises
+    ------
+    BadInput
+        For a name that is neither, and for a faulty machine file.
+    """
+    if name in shipped_machines():
+        text = (resources.files("calib") / "machines" / f"{name}.toml").read_text(encoding="utf-8")
+        return parse_machine(text, f"{name}.toml")
+    path = (beside or Path()) / name
+    if not path.is_file():
+        raise BadInput(
+            f"unknown machine {name!r}",
+            place=place,
+            remedy=f"Expected one of {', '.join(shipped_machines())}, or the path of a machine "
+            f"file relative to the run (looked for {path})",
+        )
+    return parse_machine(read_text(path), str(path))
+
+
+def read_text(path: Path) -> str:
+    """Read UTF-8 text; raises BadInput naming the file, and the line where it is not UTF-8."""
+    try:
+        raw = path.read_bytes()
+    except FileNotFoundError:
+        raise BadInput("the file is missing", place=str(path)) from None
+    except IsADirectoryError:
+        raise BadInput("this is a folder, not a file", place=str(path)) from None
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw[: error.start].count(b"\n") + 1
+        raise BadInput(
+            f"byte 0x{raw[error.start]:02x} is not UTF-8 text",
+            place=f"{path}, line {line}",
+            remedy="Expected plain UTF-8; save the file again as UTF-8",
+        ) from error
+
+
+def read_run(folder: str | Path) -> LoadedRun:
+    """Read a run's folder (or the path of its ``run.toml``); nothing in it is written to.
+
+    Raises
+    ------
+    BadInput
+        Naming file, line, column, what was found and what was expected.
+    """
+    folder = Path(folder)
+    if folder.name == HEADER and folder.is_file():
+        folder = folder.parent
+    if not folder.is_dir():
+        raise BadInput(
+            "no such folder", place=str(folder), remedy=f"A run is a folder with {HEADER}, {POINTS}"
+        )
+    run_source, points_source = str(folder / HEADER), str(folder / POINTS)
+    run_text = read_text(folder / HEADER)
+    name = parse_header(run_text, source=run_source).machine
+    machine = load_machine(name, beside=folder, place=f"{run_source}, machine")
+    run = parse_run(
+        run_text,
+        read_text(folder / POINTS),
+        actuators=len(machine.actuators),
+        parameters=[parameter.name for parameter in machine.parameters],
+        run_source=run_source,
+        points_source=points_source,
+    )
+    return LoadedRun(folder, run, machine)
+
+
+def read_runs(folders: tuple[str, ...]) -> list[LoadedRun]:
+    """Read several runs of one machine; raises BadInput where two machines are mixed."""
+    loaded = [read_run(folder) for folder in folders]
+    for other in loaded[1:]:
+        if other.machine.parameters != loaded[0].machine.parameters:
+            raise BadInput(
+                f"machine {other.run.header.machine!r}, but {loaded[0].folder} has "
+                f"{loaded[0].run.header.machine!r}",
+                place=str(other.folder / HEADER),
+                remedy="Fit runs of one machine together",
+            )
+    return loaded
+
+
+def write_run(folder: Path, run: Run) -> None:
+    """Write a run into a folder that holds none yet; raises BadInput if it does."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in zip((HEADER, POINTS), format_run(run), strict=True):
+        path = folder / name
+        if path.exists():
+            raise BadInput(
+                "the file exists already", place=str(path), remedy="Choose another folder"
+            )
+        path.write_bytes(text.encode("utf-8"))

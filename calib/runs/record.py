@@ -1,0 +1,107 @@
+"""A run as arrays: one column a row of ``points.csv``, in the order in which it was taken."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.runs.header import Header
+
+Array = NDArray[np.float64]
+
+FOLDS = 5
+FOLD_SEED = 20_200_811  # fixed for ever: a hold-out that changes between two fits is none
+
+
+@dataclass(frozen=True)
+class Run:
+    """One measuring campaign: N rows, moves without a reading among them.
+
+    Attributes
+    ----------
+    header : Header
+        What ``run.toml`` says.
+    source : str
+        Name of the points file, for messages.
+    line : array, shape (N,)
+        Line in ``points.csv`` (header = 1).
+    time_s : array, shape (N,)
+        Start of the dwell, s from the start of the run.
+    pose, nest : tuple of str, length N
+        Labels; an empty nest is a move without a reading, an empty pose a reference reading.
+    q : array, shape (n, N)
+        Commanded actuator coordinates.
+    measured : array of bool, shape (N,)
+        Which rows hold a reading.
+    position : array, shape (3, N)
+        SMR centre, tracker frame, mm; nan where nothing was read.
+    covariance : array, shape (3, 3, N)
+        Of that position, mm^2; nan where nothing was read.
+    channels : mapping of str to array, shape (N,)
+        Every other numeric column, ``delay_s`` and ``cycle`` among them; nan where empty.
+    left_aside : mapping of str to str
+        Columns that are no channel because they hold text, with the reason.
+    """
+
+    header: Header
+    source: str
+    line: NDArray[np.int64]
+    time_s: Array
+    pose: tuple[str, ...]
+    nest: tuple[str, ...]
+    q: Array
+    measured: NDArray[np.bool_]
+    position: Array
+    covariance: Array
+    channels: Mapping[str, Array]
+    left_aside: Mapping[str, str]
+
+    @property
+    def readings(self) -> int:
+        """Number of rows that hold a reading."""
+        return int(self.measured.sum())
+
+
+def approach(q: Array, threshold: Array) -> tuple[Array, Array]:
+    """Direction of approach and last step of every actuator at every row.
+
+    Parameters
+    ----------
+    q : array, shape (n, N)
+        Commanded coordinates in the order of the rows; every row counts as a move.
+    threshold : array, shape (n,)
+        Changes up to this are rounding, not motion (1e-4 mm, 1e-6 rad).
+
+    Returns
+    -------
+    direction : array, shape (n, N)
+        Sign of the last change; 0 before the first.
+    step : array, shape (n, N)
+        That last change itself, with its sign; 0 before the first.
+    """
+    change = np.diff(q, axis=1, prepend=q[:, :1])
+    change[np.abs(change) <= threshold[:, None]] = 0.0
+    latest = np.where(change != 0.0, np.arange(q.shape[1]), 0)
+    np.maximum.accumulate(latest, axis=1, out=latest)
+    step = np.take_along_axis(change, latest, axis=1)
+    return np.sign(step), step
+
+
+def holdout_folds(run: Run) -> NDArray[np.int64]:
+    """Fold (0..4) of every row, whole pose labels together; -1 for references and moves.
+
+    Seeded by a constant, so the hold-out of a run never depends on the model or on what was
+    masked. Readings on the platform without a label are grouped by their commanded q.
+    """
+    labels = [_label(run, row) for row in range(len(run.nest))]
+    unique = list(dict.fromkeys(label for label in labels if label))
+    order = np.random.default_rng(FOLD_SEED).permutation(len(unique))
+    fold = {label: int(place) % FOLDS for label, place in zip(unique, order, strict=True)}
+    return np.array([fold.get(label, -1) for label in labels], dtype=np.int64)
+
+
+def _label(run: Run, row: int) -> str:
+    if run.nest[row] not in run.header.platform_nests:
+        return ""
+    return run.pose[row] or "q " + " ".join(f"{value:.4f}" for value in run.q[:, row])
