@@ -10,3 +10,6 @@ BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.intp]
 Numbers = npt.NDArray[Any]
 """Real, or complex where a derivative is checked by complex step."""
+
+Selection = slice | BoolArray | IntArray
+"""What picks some of the poses."""

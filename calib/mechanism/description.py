@@ -93,10 +93,6 @@ class Limb:
     joints: tuple[PassiveJoint, ...]
     first_joint: int
     """Index of this limb's first passive coordinate among those of the machine."""
-    row_weights: tuple[float, ...] = ()
-    """Explicit weights of the constraint rows, only where a published closure is reproduced."""
-    dropped_rows: int = 0
-    """Constraint rows of this limb that are released (it does not carry them)."""
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ _TOP = (
 _TYPE_KEYS = ("chain", "parameters", "joints", "says")
 _PARAMETER_KEYS = ("unit", "tolerance", "sigma", "nominal", "says")
 _ACTUATOR_KEYS = ("unit", "reference", "home", "limits", "says")
-_LIMB_KEYS = ("type", "chain", "parameters", "joints", "row_weights", "dropped_rows", "says")
+_LIMB_KEYS = ("type", "chain", "parameters", "joints", "says")
 
 
 def parse_machine(text: str, source: str) -> Machine:
@@ -253,8 +253,6 @@ class _Reader:
             tuple(reader.elements),
             tuple(reader.joints),
             self.joints - len(reader.joints),
-            tuple(self.number(w, "", *keys, "row_weights") for w in spec.get("row_weights", [])),
-            int(spec.get("dropped_rows", 0)),
         )
 
     def joint_limits(

@@ -1,0 +1,325 @@
+"""The closure of a machine, linearised: the one derivation from which everything follows.
+
+For limb i, with end frame T_i, passive twists P_i and platform frame X, to first order
+
+    X moved by dx  =  T_i moved by P_i dtheta + t_e deps + a_v dv
+
+(t_e: compliant elements, a_v: parameters and actuators; twists at the platform's origin). The
+wrenches W_i reciprocal to P_i (its left null space) leave W_i^T (dx + r_i) = W_i^T a_v dv with
+r_i the twist from T_i to X. All limbs stacked are Zhang eq. (19), Han eq. (3) and Feng eq. (6).
+Where there are more rows than six, the compliant elements yield: limb i carries the wrench
+W_i lambda_i, eps = c t^T W_i lambda_i, so G_i lambda_i = W_i^T (dx + r_i + sum t eps) with
+G_i = W_i^T C_i W_i, and the platform is in equilibrium: sum W_i lambda_i = external wrench.
+
+Twists are scaled: [v / size; omega]. Arrays are component first, pose last.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib.arrays import Array, Numbers
+from calib.mechanism.compiled import (
+    ArrayElement,
+    Compiled,
+    Group,
+    compile_machine,
+    element_value,
+)
+from calib.mechanism.description import Kind, Machine
+from calib.mechanism.householder import Reflectors, factorise
+from calib.mechanism.rigid import cross, small_rotation
+
+
+@dataclass(eq=False)
+class State:
+    """Where the machine is during a solution; changed in place by the solver.
+
+    ``position`` (3, N), ``rotation`` (3, 3, N), ``passive`` (n_joints, N) and, for each group of
+    limbs, ``strain`` (n_compliant, L, N).
+    """
+
+    position: Numbers
+    rotation: Numbers
+    passive: Numbers
+    strain: list[Numbers]
+
+
+@dataclass(frozen=True, eq=False)
+class Screw:
+    """Axis of an element in the base frame: direction (3, L, N) and a point on it, or None."""
+
+    direction: Numbers
+    point: Numbers | None
+
+    def twist(self, origin: Numbers, size: float, out: Numbers) -> None:
+        """Write the scaled twist at ``origin`` (3, 1, N) into ``out`` (6, L, N)."""
+        if self.point is None:
+            np.divide(self.direction, size, out=out[:3])
+            out[3:] = 0.0
+        else:
+            moment = cross(self.direction, origin - self.point)
+            np.divide(moment, size, out=out[:3])
+            out[3:] = self.direction
+
+
+@dataclass(frozen=True, eq=False)
+class LinearLimbs:
+    """A group of limbs, linearised: passive twists factorised, wrenches, residual."""
+
+    group: Group
+    screws: tuple[Screw | None, ...]
+    factors: Reflectors
+    wrenches: Numbers
+    """W (6, rows, L, N)."""
+    gap: Numbers
+    """r (6, L, N), scaled, from the limb's end to the platform, strains taken out."""
+    residual: Numbers
+    """W^T gap (rows, L, N)."""
+
+    @property
+    def row_count(self) -> int:
+        """Rows of all limbs of the group together."""
+        return self.group.rows * self.group.count
+
+
+def _turn(columns: list[Numbers], axis: int, angle: Numbers) -> list[Numbers]:
+    k, l = (axis + 1) % 3, (axis + 2) % 3  # noqa: E741 - k, l follow the axis cyclically
+    c, s = np.cos(angle), np.sin(angle)
+    turned = list(columns)
+    turned[k] = columns[k] * c + columns[l] * s
+    turned[l] = columns[l] * c - columns[k] * s
+    return turned
+
+
+def _needs_screw(element: ArrayElement) -> bool:
+    return bool(element.terms) or element.compliance is not None
+
+
+def sweep(
+    group: Group, parameters: Numbers, extension: Numbers, state: State, strain: Numbers
+) -> tuple[Numbers, Numbers, tuple[Screw | None, ...]]:
+    """Walk along the chains of a group: end position (3, L, N), rotation (3, 3, L, N), screws."""
+    columns = [np.eye(3)[j].reshape(3, 1, 1) for j in range(3)]
+    point: Numbers = np.zeros((3, 1, 1))
+    screws: list[Screw | None] = []
+    for k, element in enumerate(group.elements):
+        if _needs_screw(element):
+            screws.append(Screw(columns[element.axis], point if element.turns else None))
+        else:
+            screws.append(None)
+        if element.compliance is not None:
+            value: Numbers | None = strain[group.compliant.index(k)]
+        else:
+            value = element_value(element, parameters, extension, state.passive)
+        if value is None:
+            continue
+        if element.turns:
+            columns = _turn(columns, element.axis, value)
+        else:
+            point = point + columns[element.axis] * value
+    shape = np.broadcast_shapes(point.shape, *(c.shape for c in columns))
+    rotation = np.stack([np.broadcast_to(c, shape) for c in columns], axis=1)
+    return point, rotation, tuple(screws)
+
+
+def _twists(
+    group: Group,
+    screws: tuple[Screw | None, ...],
+    columns: list[tuple[tuple[int, Array | None], ...]],
+    origin: Numbers,
+    size: float,
+    dtype: np.dtype[np.generic],
+) -> Numbers:
+    """Scaled twists (6, n_columns, L, N) of variables given as (element, factor) pairs."""
+    out = np.empty((6, len(columns), group.count, origin.shape[-1]), dtype=dtype)
+    for j, column in enumerate(columns):
+        for i, (k, factor) in enumerate(column):
+            screw = screws[k]
+            assert screw is not None
+            if i == 0 and factor is None:
+                screw.twist(origin, size, out[:, j])
+                continue
+            part = np.empty_like(out[:, j])
+            screw.twist(origin, size, part)
+            if factor is not None:
+                part *= factor
+            if i == 0:
+                out[:, j] = part
+            else:
+                out[:, j] += part
+    return out
+
+
+class Closure:
+    """Everything that one linearisation of a machine's closure gives.
+
+    Parameters
+    ----------
+    machine : Machine
+    parameters : (P, 1) or (P, N), mm or rad
+    extension : (n, N), mm or rad
+    state : State
+        Where the machine is now.
+    """
+
+    def __init__(
+        self, machine: Machine, parameters: Numbers, extension: Numbers, state: State
+    ) -> None:
+        self.machine = machine
+        self.compiled: Compiled = compile_machine(machine)
+        self.parameters = parameters
+        self.origin = state.position[:, None, :]
+        self.dtype = np.result_type(parameters, extension, state.position)
+        self.limbs = [
+            self._linearise(group, extension, state, state.strain[g])
+            for g, group in enumerate(self.compiled.groups)
+        ]
+
+    def _linearise(
+        self, group: Group, extension: Numbers, state: State, strain: Numbers
+    ) -> LinearLimbs:
+        size = self.machine.size
+        point, rotation, screws = sweep(group, self.parameters, extension, state, strain)
+        passive = _twists(group, screws, list(group.passive_columns), self.origin, size, self.dtype)
+        factors = factorise(passive)
+        gap = np.empty((6, group.count, self.origin.shape[-1]), dtype=self.dtype)
+        np.divide(self.origin - point, size, out=gap[:3])
+        gap[3:] = small_rotation(rotation, state.rotation[:, :, None])
+        if group.compliant:
+            yielding = self._compliant_twists(group, screws)
+            gap += np.einsum("icln,cln->iln", yielding, strain)
+        W = factors.null_space()
+        return LinearLimbs(group, screws, factors, W, gap, np.einsum("irln,iln->rln", W, gap))
+
+    def _compliant_twists(self, group: Group, screws: tuple[Screw | None, ...]) -> Numbers:
+        columns: list[tuple[tuple[int, Array | None], ...]] = [
+            ((k, None),) for k in group.compliant
+        ]
+        return _twists(group, screws, columns, self.origin, self.machine.size, self.dtype)
+
+    def flexibility(self, limb: LinearLimbs) -> Numbers:
+        """G = W^T C W (rows, rows, L, N): how far the limb yields along its own wrenches."""
+        yielding = self._compliant_twists(limb.group, limb.screws)
+        along = np.einsum("icln,irln->crln", yielding, limb.wrenches)
+        c = limb.group.compliances
+        G: Numbers = np.einsum("crln,csln->rsln", c[:, None] * along, along)
+        return G
+
+    def rows(self) -> tuple[Numbers, Numbers]:
+        """Rows A (m, 6, N) and gaps b (m, N) with A dx = -b for a closed machine.
+
+        Over-constrained rows are whitened by their flexibility, so that least squares over them
+        is the elastic equilibrium.
+        """
+        rows, gaps = [], []
+        for limb in self.limbs:
+            W, b = limb.wrenches, limb.residual
+            if self.compiled.redundant:
+                W, b = self._whiten(limb)
+            m = W.shape[1] * W.shape[2]
+            rows.append(W.reshape(6, m, -1))
+            gaps.append(b.reshape(m, -1))
+        return np.concatenate(rows, axis=1).swapaxes(0, 1), np.concatenate(gaps)
+
+    def whitener(self, limb: LinearLimbs) -> Numbers:
+        """Lower triangle (rows, rows, L, N) of the Cholesky factor of the limb's flexibility."""
+        G = self.flexibility(limb)
+        L = np.zeros_like(G)
+        for i in range(G.shape[0]):
+            for j in range(i + 1):
+                rest = G[i, j] - sum(L[i, k] * L[j, k] for k in range(j))
+                L[i, j] = np.sqrt(rest) if i == j else rest / L[j, j]
+        return L
+
+    def _whiten(self, limb: LinearLimbs) -> tuple[Numbers, Numbers]:
+        L = self.whitener(limb)
+        W = np.array(limb.wrenches)
+        b = np.array(limb.residual)
+        for i in range(L.shape[0]):
+            for k in range(i):
+                W[:, i] -= L[i, k] * W[:, k]
+                b[i] -= L[i, k] * b[k]
+            W[:, i] /= L[i, i]
+            b[i] /= L[i, i]
+        return W, b
+
+    def strain(self, limb: LinearLimbs, twist: Numbers) -> tuple[Numbers, Numbers | None]:
+        """Strains (n_compliant, L, N) of a limb pulled by ``twist`` (6, L, N), and their twist.
+
+        A machine whose limbs are not redundant carries no wrench: nothing yields.
+        """
+        if not self.compiled.redundant:
+            return np.zeros((0, *twist.shape[1:])), None
+        along = np.einsum("irln,iln->rln", limb.wrenches, twist)
+        wrench = self._solve_flexibility(self.whitener(limb), along)
+        force = np.einsum("irln,rln->iln", limb.wrenches, wrench)
+        yielding = self._compliant_twists(limb.group, limb.screws)
+        strain = limb.group.compliances * np.einsum("icln,iln->cln", yielding, force)
+        return strain, np.einsum("icln,cln->iln", yielding, strain)
+
+    @staticmethod
+    def _solve_flexibility(L: Numbers, b: Numbers) -> Numbers:
+        """(L L^T)^-1 b for L (rows, rows, L, N), b (rows, L, N)."""
+        x, m = np.array(b), L.shape[0]
+        for i in range(m):
+            for k in range(i):
+                x[i] -= L[i, k] * x[k]
+            x[i] /= L[i, i]
+        for i in range(m - 1, -1, -1):
+            for k in range(i + 1, m):
+                x[i] -= L[k, i] * x[k]
+            x[i] /= L[i, i]
+        return x
+
+    def actuator_twist(self, limb: LinearLimbs, ds: Numbers) -> Numbers:
+        """Scaled twist (6, L, N) of the limb's end for extension steps ds (n, N)."""
+        out = np.zeros_like(limb.gap)
+        part = np.empty_like(limb.gap)
+        for element, screw in zip(limb.group.elements, limb.screws, strict=True):
+            for term in element.terms:
+                if term.kind != "actuator" or screw is None:
+                    continue
+                screw.twist(self.origin, self.machine.size, part)
+                share = ds[term.index]
+                out += part * (share if term.factor is None else term.factor * share)
+        return out
+
+    def columns(self, kind: Kind) -> Iterator[tuple[int, slice, Numbers]]:
+        """Answer of the rows of :meth:`rows` to each variable of a kind, limb by limb.
+
+        Yields (variable, rows, coefficients (len(rows), N)): W^T a_v of one element of one limb.
+        A variable that stands in several elements comes several times.
+        """
+        offset = 0
+        for limb in self.limbs:
+            L = self.whitener(limb) if self.compiled.redundant else None
+            for element, screw in zip(limb.group.elements, limb.screws, strict=True):
+                for term in element.terms:
+                    if term.kind != kind:
+                        continue
+                    answer = self._answer(limb, screw, L)
+                    if term.factor is not None:
+                        answer = term.factor * answer
+                    for i, variable in enumerate(term.index):
+                        rows = slice(offset + i, offset + limb.row_count, limb.group.count)
+                        yield int(variable), rows, answer[:, i]
+            offset += limb.row_count
+
+    def _answer(self, limb: LinearLimbs, screw: Screw | None, L: Numbers | None) -> Numbers:
+        assert screw is not None
+        W, size = limb.wrenches, self.machine.size
+        answer: Numbers
+        if screw.point is None:
+            answer = np.einsum("irln,iln->rln", W[:3], screw.direction / size)
+        else:
+            moment = cross(screw.direction, self.origin - screw.point) / size
+            answer = np.einsum("irln,iln->rln", W[:3], moment)
+            answer += np.einsum("irln,iln->rln", W[3:], screw.direction)
+        if L is not None:
+            for i in range(L.shape[0]):
+                for k in range(i):
+                    answer[i] -= L[i, k] * answer[k]
+                answer[i] /= L[i, i]
+        return answer
