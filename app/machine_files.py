@@ -1,0 +1,58 @@
+"""Where machine descriptions are found: shipped with the program, or in a file of the lab's."""
+
+from importlib import resources
+from pathlib import Path
+
+from calib.errors import BadInput
+from calib.mechanism.description import Machine
+from calib.mechanism.parse import parse_machine
+
+
+def shipped_machines() -> list[str]:
+    """Names of the machines that ship with the program."""
+    folder = resources.files("calib.machines")
+    return sorted(
+        entry.name.removesuffix(".toml")
+        for entry in folder.iterdir()
+        if entry.name.endswith(".toml")
+    )
+
+
+def load_machine(name_or_path: str, relative_to: Path | None = None) -> Machine:
+    """Load a machine by the name of a shipped one, or from a machine file.
+
+    Parameters
+    ----------
+    name_or_path : str
+        ``"hexapod"``, or the path of a ``.toml`` file.
+    relative_to : Path, optional
+        Folder that a relative path starts from; the current one by default.
+
+    Raises
+    ------
+    BadInput
+        If there is no such machine, or its file cannot be used.
+    """
+    if name_or_path in shipped_machines():
+        shipped = resources.files("calib.machines") / f"{name_or_path}.toml"
+        return parse_machine(shipped.read_text(encoding="utf-8"), f"{name_or_path}.toml")
+    path = (relative_to or Path()) / name_or_path
+    if not path.is_file():
+        raise BadInput(
+            f'unknown machine "{name_or_path}"',
+            remedy=f"Shipped machines: {', '.join(shipped_machines())}; or give the path of a "
+            "machine file",
+        )
+    return parse_machine(read_text(path), str(path))
+
+
+def read_text(path: Path) -> str:
+    """Read a UTF-8 file; what cannot be read is bad input."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise BadInput(
+            f"not UTF-8 text (byte {error.start})", place=str(path), remedy="Save it as UTF-8"
+        ) from error
+    except OSError as error:
+        raise BadInput(error.strerror or str(error), place=str(path)) from error

@@ -1,0 +1,292 @@
+"""The truth about what happened: an SQLite journal with one writer.
+
+Every step goes ``planned -> started(attempt) -> done | failed | skipped``. A reading and the end
+of its step are one transaction, so that a process killed at any moment has the reading exactly
+once or not at all. Rows are never deleted: a reading that is set aside keeps its row and the
+reason.
+"""
+
+import json
+import sqlite3
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from app.session.plan import Plan
+from calib.errors import BadInput
+
+_SCHEMA = """
+CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS steps (
+    id TEXT PRIMARY KEY, position INTEGER NOT NULL, kind TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS log (
+    seq INTEGER PRIMARY KEY AUTOINCREMENT, step TEXT NOT NULL REFERENCES steps (id),
+    state TEXT NOT NULL, attempt INTEGER NOT NULL, time_s REAL NOT NULL, utc TEXT NOT NULL,
+    result TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS rows (
+    seq INTEGER PRIMARY KEY AUTOINCREMENT, step TEXT NOT NULL, attempt INTEGER NOT NULL,
+    kind TEXT NOT NULL CHECK (kind IN ('move', 'reading')),
+    status TEXT NOT NULL DEFAULT 'good' CHECK (status IN ('good', 'rejected', 'invalidated')),
+    why TEXT NOT NULL DEFAULT '', time_s REAL NOT NULL, utc TEXT NOT NULL, pose TEXT NOT NULL,
+    nest TEXT NOT NULL, q TEXT NOT NULL, xyz TEXT, covariance TEXT, delay_s REAL, cycle INTEGER,
+    channels TEXT NOT NULL, raw TEXT NOT NULL);
+CREATE UNIQUE INDEX IF NOT EXISTS one_good_reading
+    ON rows (step) WHERE kind = 'reading' AND status = 'good';
+CREATE TABLE IF NOT EXISTS notes (
+    seq INTEGER PRIMARY KEY AUTOINCREMENT, time_s REAL NOT NULL, utc TEXT NOT NULL,
+    kind TEXT NOT NULL, text TEXT NOT NULL);
+"""
+
+PENDING = ("planned", "started", "failed")
+
+
+@dataclass(frozen=True)
+class StepState:
+    """Where a step is: its last log entry."""
+
+    state: str
+    attempt: int
+    result: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A move or a reading; ``xyz`` (tracker frame, mm) and ``covariance`` only for readings."""
+
+    seq: int
+    step: str
+    kind: str
+    status: str
+    why: str
+    time_s: float
+    pose: str
+    nest: str
+    q: tuple[float, ...]
+    xyz: tuple[float, float, float] | None
+    covariance: tuple[float, ...] | None
+    delay_s: float | None
+    cycle: int | None
+    channels: Mapping[str, float]
+    raw: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class NewRow:
+    """What the engine hands over to be written; meanings as in :class:`Row`."""
+
+    kind: str
+    time_s: float
+    pose: str
+    q: tuple[float, ...]
+    nest: str = ""
+    xyz: tuple[float, float, float] | None = None
+    covariance: tuple[float, ...] | None = None
+    delay_s: float | None = None
+    cycle: int | None = None
+    channels: Mapping[str, float] | None = None
+    raw: Mapping[str, Any] | None = None
+    status: str = "good"
+    why: str = ""
+
+
+class Journal:
+    """Opens, or creates, the journal of one session."""
+
+    def __init__(self, path: Path, *, read_only: bool = False) -> None:
+        if read_only and not path.is_file():
+            raise BadInput("no journal here", place=str(path), remedy="Name a session's folder")
+        target = f"{path.resolve().as_uri()}?mode=ro" if read_only else str(path)
+        self._db = sqlite3.connect(target, uri=read_only, isolation_level=None, timeout=5.0)
+        self._db.row_factory = sqlite3.Row
+        try:
+            if not read_only:
+                self._db.execute("PRAGMA journal_mode = WAL")
+                self._db.execute("PRAGMA synchronous = FULL")
+                self._db.executescript(_SCHEMA)
+            self._db.execute("SELECT count(*) FROM meta").fetchone()
+        except sqlite3.DatabaseError as error:
+            self._db.close()
+            raise BadInput(f"not a journal of this program ({error})", place=str(path)) from error
+
+    def close(self) -> None:
+        """Close the database."""
+        self._db.close()
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        self._db.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+        except BaseException:
+            self._db.execute("ROLLBACK")
+            raise
+        self._db.execute("COMMIT")
+
+    # meta
+
+    def set_meta(self, key: str, value: Any) -> None:
+        """Remember a fact about the session."""
+        self._db.execute(
+            "INSERT INTO meta VALUES (?, ?) ON CONFLICT (key) DO UPDATE SET value = excluded.value",
+            (key, json.dumps(value)),
+        )
+
+    def meta(self, key: str, default: Any = None) -> Any:
+        """Recall a fact about the session."""
+        row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
+        return default if row is None else json.loads(row["value"])
+
+    # steps
+
+    def enter_plan(self, plan: Plan) -> None:
+        """Enter every step as planned; a plan that is there already must be the same."""
+        known = [row["id"] for row in self._db.execute("SELECT id FROM steps ORDER BY position")]
+        ids = [step.id for step in plan.steps]
+        if known:
+            if known != ids:
+                raise BadInput("journal and plan do not belong together", remedy="Measure anew")
+            return
+        with self._transaction():
+            self._db.executemany(
+                "INSERT INTO steps VALUES (?, ?, ?)",
+                [(step.id, position, step.kind) for position, step in enumerate(plan.steps)],
+            )
+
+    def states(self) -> dict[str, StepState]:
+        """State of every step that has a log entry."""
+        rows = self._db.execute(
+            "SELECT step, state, attempt, result FROM log WHERE seq IN "
+            "(SELECT max(seq) FROM log GROUP BY step)"
+        )
+        return {
+            row["step"]: StepState(row["state"], row["attempt"], json.loads(row["result"]))
+            for row in rows
+        }
+
+    def started(self, step: str, attempt: int, time_s: float, utc: str) -> None:
+        """Write that a step begins."""
+        self._log(step, "started", attempt, time_s, utc, {})
+
+    def done(
+        self,
+        step: str,
+        attempt: int,
+        time_s: float,
+        utc: str,
+        result: Mapping[str, Any],
+        reading: NewRow | None = None,
+    ) -> int:
+        """Write that a step ended well, together with its reading; returns the row's number."""
+        with self._transaction():
+            number = self._insert(step, attempt, utc, reading) if reading else 0
+            self._log(step, "done", attempt, time_s, utc, result)
+        return number
+
+    def failed(self, step: str, attempt: int, time_s: float, utc: str, what: str) -> None:
+        """Write that a step did not end well."""
+        self._log(step, "failed", attempt, time_s, utc, {"what": what})
+
+    def skipped(self, step: str, attempt: int, time_s: float, utc: str, why: str) -> None:
+        """Write that a step is left out."""
+        self._log(step, "skipped", attempt, time_s, utc, {"why": why})
+
+    def _log(
+        self, step: str, state: str, attempt: int, time_s: float, utc: str, result: Any
+    ) -> None:
+        self._db.execute(
+            "INSERT INTO log (step, state, attempt, time_s, utc, result) VALUES (?, ?, ?, ?, ?, ?)",
+            (step, state, attempt, time_s, utc, json.dumps(result)),
+        )
+
+    # rows
+
+    def add_row(self, step: str, attempt: int, utc: str, row: NewRow) -> int:
+        """Write a move, or a reading that is set aside; returns its number."""
+        with self._transaction():
+            return self._insert(step, attempt, utc, row)
+
+    def _insert(self, step: str, attempt: int, utc: str, row: NewRow) -> int:
+        cursor = self._db.execute(
+            "INSERT INTO rows (step, attempt, kind, status, why, time_s, utc, pose, nest, q, xyz, "
+            "covariance, delay_s, cycle, channels, raw) "
+            "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            (
+                step, attempt, row.kind, row.status, row.why, row.time_s, utc, row.pose, row.nest,
+                json.dumps(row.q),
+                None if row.xyz is None else json.dumps(row.xyz),
+                None if row.covariance is None else json.dumps(row.covariance),
+                row.delay_s, row.cycle, json.dumps(row.channels or {}), json.dumps(row.raw or {}),
+            ),
+        )  # fmt: skip
+        return cursor.lastrowid or 0
+
+    def rows(self, *, good_only: bool = True) -> list[Row]:
+        """Every move and reading in the order in which it happened."""
+        where = "WHERE status = 'good'" if good_only else ""
+        return [_row(row) for row in self._db.execute(f"SELECT * FROM rows {where} ORDER BY seq")]
+
+    def last_row(self) -> Row | None:
+        """The last move or reading, whatever became of it."""
+        row = self._db.execute("SELECT * FROM rows ORDER BY seq DESC LIMIT 1").fetchone()
+        return _row(row) if row else None
+
+    def last_time(self) -> float:
+        """Latest machine time that stands in the journal, s."""
+        row = self._db.execute(
+            "SELECT max(t) AS t FROM (SELECT max(time_s) AS t FROM log "
+            "UNION ALL SELECT max(time_s) FROM rows)"
+        ).fetchone()
+        return float(row["t"] or 0.0)
+
+    def invalidate(self, after_seq: int, why: str, time_s: float, utc: str) -> list[str]:
+        """Set good readings after a row aside, and let their steps be done again."""
+        with self._transaction():
+            found = self._db.execute(
+                "SELECT DISTINCT step, attempt FROM rows "
+                "WHERE seq > ? AND kind = 'reading' AND status = 'good'",
+                (after_seq,),
+            ).fetchall()
+            self._db.execute(
+                "UPDATE rows SET status = 'invalidated', why = ? "
+                "WHERE seq > ? AND kind = 'reading' AND status = 'good'",
+                (why, after_seq),
+            )
+            for row in found:
+                self._log(row["step"], "failed", row["attempt"], time_s, utc, {"what": why})
+        return [row["step"] for row in found]
+
+    # notes
+
+    def note(self, kind: str, text: str, time_s: float, utc: str) -> None:
+        """Write down an alarm, an answer, a remark."""
+        self._db.execute(
+            "INSERT INTO notes (time_s, utc, kind, text) VALUES (?, ?, ?, ?)",
+            (time_s, utc, kind, text),
+        )
+
+    def notes(self) -> list[tuple[float, str, str]]:
+        """Time in s, kind and text of every note."""
+        rows = self._db.execute("SELECT time_s, kind, text FROM notes ORDER BY seq")
+        return [(row["time_s"], row["kind"], row["text"]) for row in rows]
+
+
+def _row(row: sqlite3.Row) -> Row:
+    return Row(
+        seq=row["seq"],
+        step=row["step"],
+        kind=row["kind"],
+        status=row["status"],
+        why=row["why"],
+        time_s=row["time_s"],
+        pose=row["pose"],
+        nest=row["nest"],
+        q=tuple(json.loads(row["q"])),
+        xyz=None if row["xyz"] is None else tuple(json.loads(row["xyz"])),
+        covariance=None if row["covariance"] is None else tuple(json.loads(row["covariance"])),
+        delay_s=row["delay_s"],
+        cycle=row["cycle"],
+        channels=json.loads(row["channels"]),
+        raw=json.loads(row["raw"]),
+    )

@@ -1,0 +1,132 @@
+"""The two plans that operators run: measure poses, in either order, and verify."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from app.session.plan import Plan, PlanWriter, Pose
+from app.site import Site
+from calib.errors import BadInput
+
+Order = Literal["nest-by-nest", "pose-by-pose"]
+
+
+@dataclass(frozen=True)
+class PlanOptions:
+    """How a campaign is run.
+
+    ``reference_every`` counts poses between two looks at the base nests. ``order``: carry one SMR
+    from nest to nest and visit all poses with each, or hold SMRs in all nests and let the tracker
+    re-point at each pose. ``cycles`` repeats the poses (ISO 9283).
+    """
+
+    order: Order = "nest-by-nest"
+    reference_every: int = 30
+    cycles: int = 1
+    warm_up: bool = True
+    two_face: bool = True
+    title: str = ""
+
+
+def measure_plan(
+    site: Site, poses: Mapping[str, Pose], options: PlanOptions, purpose: str = "measure"
+) -> Plan:
+    """Expand a campaign into steps.
+
+    Raises
+    ------
+    BadInput
+        If there are no poses, or fewer SMRs than the order needs.
+    """
+    if not poses:
+        raise BadInput("no poses to measure", remedy="Give a poses file with at least one pose")
+    nests = list(site.platform_nests)
+    if options.order == "pose-by-pose" and site.hands.smrs < len(nests):
+        raise BadInput(
+            f"pose by pose needs an SMR in each of the {len(nests)} platform nests, the site has "
+            f"{site.hands.smrs}",
+            place=site.source,
+            remedy="Set hands.smrs, or measure nest by nest",
+        )
+    plan = PlanWriter()
+    _prepare(plan, options)
+    _reference(plan, site, "start")
+    if options.two_face:
+        plan.add("two-face", "start", "two-face check of the tracker")
+    if options.order == "nest-by-nest":
+        _nest_by_nest(plan, site, poses, options)
+    else:
+        _pose_by_pose(plan, site, poses, options)
+    plan.add("home", "end", "return to the home pose")
+    _reference(plan, site, "end")
+    if options.two_face:
+        plan.add("two-face", "end", "two-face check of the tracker")
+    plan.add("rest", "", "take the power off the drives")
+    title = options.title or f"{site.machine.name}, {len(poses)} poses, {len(nests)} nests"
+    return Plan(purpose, title, site.machine_name, dict(poses), tuple(plan.steps))
+
+
+def _prepare(plan: PlanWriter, options: PlanOptions) -> None:
+    plan.add("connect", "", "identities and the controller's parameters")
+    plan.add("check-path", "", "the whole path against all limits")
+    plan.add("tracker", "", "initialise the tracker, choose the reflector")
+    plan.add("drives", "", "drives on")
+    if options.warm_up:
+        plan.add("warm-up", "", "wait until laser and machine are warm and steady")
+    plan.add("home", "start", "go to the home pose")
+
+
+def _reference(plan: PlanWriter, site: Site, about: str) -> None:
+    """Read every base nest, then judge the drift (or find the base frame, the first time)."""
+    for nest in site.base_nests:
+        plan.add("reference", f"{about}-{nest}", f"reference nest {nest} on the base", nest=nest)
+    says = "find the base in the tracker's frame" if about == "start" else "drift of the base"
+    plan.add("drift", about, says, nests=list(site.base_nests), group=about)
+
+
+def _nest_by_nest(
+    plan: PlanWriter, site: Site, poses: Mapping[str, Pose], options: PlanOptions
+) -> None:
+    visited = 0
+    for nest in site.platform_nests:
+        plan.add("home", f"nest-{nest}", "home, for the SMR to be carried")
+        plan.add("carry", nest, f"SMR into nest {nest}", nest=nest, smr=1)
+        plan.add("confirm", nest, f"is it nest {nest} that the tracker sees?", nest=nest)
+        for cycle in range(1, options.cycles + 1):
+            for label in poses:
+                if visited and visited % options.reference_every == 0:
+                    _reference(plan, site, f"after-{visited}")
+                plan.add("move", f"{label}-{nest}", f"move to pose {label}", pose=label)
+                _read(plan, label, nest, cycle, options)
+                visited += 1
+
+
+def _pose_by_pose(
+    plan: PlanWriter, site: Site, poses: Mapping[str, Pose], options: PlanOptions
+) -> None:
+    nests = list(site.platform_nests)
+    plan.add("home", "carry", "home, for the SMRs to be carried")
+    for smr, nest in enumerate(nests, start=1):
+        plan.add("carry", nest, f"SMR {smr} into nest {nest}", nest=nest, smr=smr)
+    for nest in nests:
+        plan.add("confirm", nest, f"is it nest {nest} that the tracker sees?", nest=nest)
+    visited = 0
+    for cycle in range(1, options.cycles + 1):
+        for label in poses:
+            if visited and visited % options.reference_every == 0:
+                _reference(plan, site, f"after-{visited}")
+            plan.add("move", label, f"move to pose {label}", pose=label)
+            # Back and forth: the beam is already on the nest that was read last.
+            for nest in nests if visited % 2 == 0 else reversed(nests):
+                _read(plan, label, nest, cycle, options)
+            visited += 1
+
+
+def _read(plan: PlanWriter, label: str, nest: str, cycle: int, options: PlanOptions) -> None:
+    args = {"cycle": cycle} if options.cycles > 1 else {}
+    plan.add("read", f"{label}-{nest}", f"read nest {nest}", pose=label, nest=nest, **args)
+
+
+def pose_labels(poses: Sequence[Pose]) -> dict[str, Pose]:
+    """Label poses by their number."""
+    return {str(number): pose for number, pose in enumerate(poses, start=1)}
