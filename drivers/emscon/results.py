@@ -1,0 +1,48 @@
+"""Data packets as readings and samples."""
+
+import math
+from collections.abc import Iterator
+
+from drivers.emscon import wire
+from drivers.errors import ProtocolError
+from drivers.interface import TrackerReading, TrackSample
+
+
+def reading(packet: wire.Packet, device: str) -> TrackerReading:
+    """The mean of one dwell, from a packet of type 2 or 9.
+
+    The a-priori standard deviations are taken as the uncertainty of the mean: the statistics of
+    the samples know nothing of what is slower than the dwell. Covariances come with type 9 only.
+    Raises ProtocolError for numbers that are none, or uncertainties that are not positive.
+    """
+    xyz = (packet.real("val1"), packet.real("val2"), packet.real("val3"))
+    sigma = (packet.real("apriori1"), packet.real("apriori2"), packet.real("apriori3"))
+    if not all(s > 0.0 for s in sigma):
+        sigma = (packet.real("std1"), packet.real("std2"), packet.real("std3"))
+    mixed = tuple(
+        packet.real(name) if name in packet.fields else 0.0
+        for name in ("apriori_covar12", "apriori_covar13", "apriori_covar23")
+    )
+    if not all(map(math.isfinite, (*xyz, *sigma, *mixed))) or not all(s > 0.0 for s in sigma):
+        raise ProtocolError(
+            f"the reading {xyz} with uncertainty {sigma} mm is not usable",
+            device=device,
+            remedy="Check the tracker's statistics mode, then measure again.",
+        )
+    return TrackerReading(
+        xyz=xyz,
+        covariance=(sigma[0] ** 2, sigma[1] ** 2, sigma[2] ** 2, mixed[0], mixed[1], mixed[2]),
+        temperature_C=packet.real("temperature"),
+        pressure_hPa=packet.real("pressure"),
+        humidity=packet.real("humidity"),
+    )
+
+
+def samples(packet: wire.Packet) -> Iterator[TrackSample]:
+    """The records of a continuous-mode packet (type 3); time = seconds + microseconds."""
+    for record in packet.records:
+        yield TrackSample(
+            time_s=float(record["seconds"]) + 1e-6 * float(record["microseconds"]),
+            xyz=(float(record["val1"]), float(record["val2"]), float(record["val3"])),
+            valid=record["status"] == 0,
+        )

@@ -1,0 +1,200 @@
+"""The hexapod's closed form (Han et al. 2020, as corrected in the reading notes, section 1).
+
+Limb i has fixed joint frames FB = Rz(phi_b), FP = Rz(phi_p) with columns x, y, z::
+
+    C = B + LB n_B                    n_B unit, perpendicular to x_B, towards the leg
+    D = t + R (P + LP n_P)            n_P unit, perpendicular to x_P, towards the leg
+    v = D - C = l u,  u . (x_B x n_B) = 0,  u . R (x_P x n_P) = 0
+
+The perpendicularity says that n_B is the direction of D - B projected along x_B, and R n_P that
+of C - (t + R P) projected along R x_P. The two are found by going back and forth: each sweep
+shrinks the error by (offset / leg length)^2, about 5e-4. Because the leg is perpendicular to both
+second axes, dl/d(t, rotation vector) = [u, R (P + LP n_P) x u] holds exactly.
+
+Arrays here are (N, 6, 3): pose, leg, component. mm and rad.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+LEGS = 6
+PHI_B_DEG = (15.0, 105.0, 135.0, 225.0, 255.0, 345.0)
+PHI_P_DEG = (45.0, 75.0, 165.0, 195.0, 285.0, 315.0)
+HOME_Z = 220.0
+FIRST_SWEEPS = 5
+LATER_SWEEPS = 2
+MOST_STEPS = 40
+CLOSED_MM = 1e-10
+
+
+@dataclass(frozen=True)
+class HexapodGeometry:
+    """Six legs: joint centres ``B``, ``P`` (6, 3), lengths ``L0``, ``LB``, ``LP`` (6,), frames.
+
+    ``FB``, ``FP`` (6, 3, 3) are the joint frames in the base and in the platform frame.
+    """
+
+    B: Array
+    P: Array
+    L0: Array
+    LB: Array
+    LP: Array
+    FB: Array
+    FP: Array
+
+
+@dataclass(frozen=True)
+class Legs:
+    """Legs at N poses: ``length`` (N, 6), and (N, 6, 3) in the base frame: ``u`` along the leg
+    from C to D, ``arm`` from the platform's origin to D, second axes ``second_base``, ``second_platform``,
+    and ``arm_axis`` R n_P."""
+
+    length: Array
+    u: Array
+    arm: Array
+    second_base: Array
+    second_platform: Array
+    arm_axis: Array
+
+    def rows(self) -> Array:
+        """dl/d(t, rotation vector in the base frame), (N, 6, 6)."""
+        return np.asarray(np.concatenate([self.u, np.cross(self.arm, self.u)], axis=2))
+
+    def twist(self) -> Array:
+        """Angle from the base-side to the platform-side second axis about u, right-handed, (N, 6), rad."""
+        sine = np.sum(self.u * np.cross(self.second_base, self.second_platform), axis=2)
+        return np.arctan2(sine, np.sum(self.second_base * self.second_platform, axis=2))
+
+
+@dataclass(frozen=True)
+class Pose:
+    """N poses: ``position`` (N, 3) mm and ``rotation`` (N, 3, 3) of the platform in the base."""
+
+    position: Array
+    rotation: Array
+
+    def points(self, platform: Array) -> Array:
+        """Points ``platform`` (3,) or (N, 3), platform frame, in the base frame: (N, 3)."""
+        return np.asarray(
+            self.position + np.einsum("nij,...j->ni" if platform.ndim == 1 else "nij,nj->ni",
+                                      self.rotation, platform)
+        )  # fmt: skip
+
+
+def rotation_z(angle: float) -> Array:
+    """Rotation about z, (3, 3)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def rotation_from_rpy(rx: float, ry: float, rz: float) -> Array:
+    """Rz(rz) Ry(ry) Rx(rx), (3, 3)."""
+    cx, sx, cy, sy = np.cos(rx), np.sin(rx), np.cos(ry), np.sin(ry)
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
+    about_y = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
+    return np.asarray(rotation_z(rz) @ about_y @ about_x)
+
+
+def rpy_from_rotation(rotation: Array) -> Array:
+    """(N, 3) angles rx, ry, rz with Rz(rz) Ry(ry) Rx(rx) = rotation (N, 3, 3)."""
+    rx = np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2])
+    ry = np.arctan2(-rotation[:, 2, 0], np.hypot(rotation[:, 0, 0], rotation[:, 1, 0]))
+    rz = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+    return np.stack([rx, ry, rz], axis=1)
+
+
+def rotation_from_vector(vector: Array) -> Array:
+    """Rodrigues' formula for rotation vectors (N, 3): (N, 3, 3)."""
+    angle = np.linalg.norm(vector, axis=1)[:, None, None]
+    skew = np.zeros((vector.shape[0], 3, 3))
+    skew[:, 0, 1], skew[:, 0, 2], skew[:, 1, 2] = -vector[:, 2], vector[:, 1], -vector[:, 0]
+    skew -= skew.transpose(0, 2, 1)
+    safe = np.where(angle < 1e-8, 1.0, angle)
+    first = np.where(angle < 1e-8, 1.0, np.sin(safe) / safe)
+    second = np.where(angle < 1e-8, 0.5, (1.0 - np.cos(safe)) / safe**2)
+    return np.asarray(np.eye(3) + first * skew + second * (skew @ skew))
+
+
+def geometry(
+    parameters: Mapping[str, float], tilt_B: Array | None = None, tilt_P: Array | None = None
+) -> HexapodGeometry:
+    """Geometry from parameters ``leg1.B_x`` ...; tilts (6, 2): local rotations about y and z."""
+
+    def triple(stem: str) -> Array:
+        return np.array([[parameters[f"leg{i}.{stem}_{a}"] for a in "xyz"] for i in range(1, 7)])
+
+    def single(stem: str) -> Array:
+        return np.array([parameters[f"leg{i}.{stem}"] for i in range(1, 7)])
+
+    def frames(degrees: tuple[float, ...], tilt: Array | None) -> Array:
+        plain = np.array([rotation_z(np.radians(d)) for d in degrees])
+        if tilt is None or not tilt.any():
+            return plain
+        vectors = np.column_stack([np.zeros(LEGS), tilt])
+        return np.asarray(plain @ rotation_from_vector(vectors))
+
+    return HexapodGeometry(
+        B=triple("B"), P=triple("P"), L0=single("L0"), LB=single("L_B"), LP=single("L_P"),
+        FB=frames(PHI_B_DEG, tilt_B), FP=frames(PHI_P_DEG, tilt_P),
+    )  # fmt: skip
+
+
+def _across(vectors: Array, axis: Array) -> Array:
+    """Unit vectors of ``vectors`` projected along the unit ``axis``."""
+    flat = vectors - np.sum(vectors * axis, axis=-1, keepdims=True) * axis
+    return np.asarray(flat / np.sqrt(np.sum(flat * flat, axis=-1, keepdims=True)))
+
+
+def legs(g: HexapodGeometry, pose: Pose, n_P: Array | None = None) -> Legs:
+    """Inverse kinematics: the legs that reach N poses; ``n_P`` (N, 6, 3) is a nearby start."""
+    joint = pose.position[:, None, :] + np.einsum("nij,lj->nli", pose.rotation, g.P)
+    x_B = g.FB[:, :, 0]
+    x_P = np.einsum("nij,lj->nli", pose.rotation, g.FP[:, :, 0])
+    end = joint if n_P is None else joint + g.LP[:, None] * n_P
+    for _ in range(FIRST_SWEEPS if n_P is None else LATER_SWEEPS):
+        n_B = _across(end - g.B, x_B)
+        start = g.B + g.LB[:, None] * n_B
+        n_P = _across(start - joint, x_P)
+        end = joint + g.LP[:, None] * n_P
+    assert n_P is not None
+    v = end - start
+    length = np.sqrt(np.sum(v * v, axis=2))
+    return Legs(
+        length=length, u=v / length[:, :, None], arm=end - pose.position[:, None, :],
+        second_base=np.cross(x_B, n_B), second_platform=np.cross(x_P, n_P), arm_axis=n_P,
+    )  # fmt: skip
+
+
+def home_pose(count: int) -> Pose:
+    """``count`` copies of the nominal home pose."""
+    position = np.tile([0.0, 0.0, HOME_Z], (count, 1))
+    return Pose(position, np.tile(np.eye(3), (count, 1, 1)))
+
+
+def forward(
+    g: HexapodGeometry, wanted: Callable[[Legs, Pose], Array], start: Pose
+) -> tuple[Pose, Legs]:
+    """Poses at which every leg has the length that it should have.
+
+    Newton on the closed-form lengths from ``start`` (N poses). ``wanted(legs, pose)`` gives the
+    lengths (N, 6) in mm; it may depend weakly on the pose (twist, load). Raises ArithmeticError
+    if the legs cannot close.
+    """
+    pose, n_P = start, None
+    for _ in range(MOST_STEPS):
+        found = legs(g, pose, n_P)
+        residual = wanted(found, pose) - found.length
+        if float(np.max(np.abs(residual), initial=0.0)) < CLOSED_MM:
+            return pose, found
+        step: Array = np.asarray(
+            np.linalg.solve(found.rows(), residual[:, :, None])[:, :, 0], dtype=np.float64
+        )
+        turn = rotation_from_vector(step[:, 3:])
+        pose = Pose(pose.position + step[:, :3], turn @ pose.rotation)
+        n_P = found.arm_axis
+    raise ArithmeticError(f"the legs do not close: {np.max(np.abs(residual)):.3g} mm are left")

@@ -1,0 +1,109 @@
+"""What is wrong with a mock machine beyond its parameters: a flat table of named numbers.
+
+Names of the catalogue are those of its parameters (``backlash.leg3``, ``thermal-growth.a``).
+The names that begin with ``unknown.`` are the mock's own, outside the catalogue:
+
+=================================  ===============================================================
+``unknown.screw-quadratic.legN``   1/mm: extension = k s^2
+``unknown.hysteresis.legN``        mm: extension with a memory of several past reversals
+``unknown.bending.k``              mm/K: legs bend when structure and air differ, sunny side more
+``unknown.soft-legs.k``            1/N: compliance that grows with extension, k s F
+``unknown.platform-flex.k``        mm: nests sag within the platform when it tilts
+``unknown.tide.amplitude``         mm, with ``unknown.tide.period`` s: floor heaves in a rhythm
+``unknown.wobble.amplitude``       mm, with ``unknown.wobble.period`` deg: bearing error of the
+                                   tracker's vertical axis
+``unknown.two-face.hz``            rad: collimation error, of opposite sign in the two faces
+=================================  ===============================================================
+"""
+
+import json
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_LEG = r"leg[1-6]"
+_CATALOGUE = (
+    r"gravity-sag\.c",
+    r"thermal-growth\.a",
+    rf"screw-pitch\.{_LEG}",
+    rf"screw-cyclic\.{_LEG}\.(sin|cos)",
+    r"screw-cyclic\.period",
+    rf"backlash\.{_LEG}",
+    r"screw-twist\.L",
+    rf"joint-tilt\.{_LEG}\.(B|P)[._]?(y|z)",
+    r"settling\.(k|tau)",
+    r"tracker-scale\.k",
+    r"tracker-offset\.r0",
+    r"tracker-drift\.([vw][xyz]|duration)",
+    r"nest-offset\.[^.]+\.[xyz]",
+    r"frame-shift\.((base|platform)\.)?(x|y|z|rx|ry|rz)",
+    r"frame-shift\.t0",
+)
+_UNKNOWN = (
+    rf"screw-quadratic\.{_LEG}",
+    rf"hysteresis\.{_LEG}",
+    r"bending\.k",
+    r"soft-legs\.k",
+    r"platform-flex\.k",
+    r"(tide|wobble)\.(amplitude|period)",
+    r"two-face\.hz",
+)
+_KNOWN = re.compile("|".join([*_CATALOGUE, *(rf"unknown\.{name}" for name in _UNKNOWN)]))
+
+
+class Hidden:
+    """A table of hidden effects.
+
+    Parameters
+    ----------
+    table : mapping
+        Names and numbers, nested or dotted; raises ValueError for a name that is not known.
+    """
+
+    def __init__(self, table: Mapping[str, object] | None = None) -> None:
+        self.values: dict[str, float] = dict(_flat(table or {}))
+        for name in self.values:
+            if _KNOWN.fullmatch(name) is None:
+                raise ValueError(
+                    f'the mock knows no hidden effect "{name}"; '
+                    "names are those of the catalogue's parameters, or begin with unknown."
+                )
+
+    @classmethod
+    def read(cls, path: Path) -> "Hidden":
+        """Read a TOML or JSON file with a table ``hidden`` (or nothing but the table)."""
+        text = path.read_text(encoding="utf-8")
+        table = json.loads(text) if path.suffix == ".json" else tomllib.loads(text)
+        return cls(table.get("hidden", table))
+
+    def get(self, name: str, default: float = 0.0) -> float:
+        """One number; ``default`` where it is not given."""
+        return self.values.get(name, default)
+
+    def legs(self, pattern: str) -> Array:
+        """Six numbers: ``pattern`` with ``*`` for leg1..leg6, (6,)."""
+        return np.array([self.get(pattern.replace("*", f"leg{i}")) for i in range(1, 7)])
+
+    def vector(self, stem: str, names: str = "x y z") -> Array:
+        """Numbers ``stem.x``, ``stem.y``, ..., (len(names),)."""
+        return np.array([self.get(f"{stem}.{name}") for name in names.split()])
+
+    def has(self, prefix: str) -> bool:
+        """Whether any number of this effect is given."""
+        return any(name.startswith(prefix) for name in self.values)
+
+
+def _flat(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, float]]:
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}.")
+        elif isinstance(value, (int, float)) and not isinstance(value, bool):
+            yield prefix + key, float(value)
+        else:
+            raise ValueError(f'hidden effect "{prefix}{key}" must be a number, got {value!r}')
