@@ -1,0 +1,38 @@
+"""Physical effects as components, one file each; :func:`catalogue` finds them."""
+
+import pkgutil
+from functools import lru_cache
+from importlib import import_module
+
+from calib.effects.component import Effect, Signature, Situation, Unknown
+from calib.errors import BadInput
+from calib.mechanism.description import Machine
+
+__all__ = ["Effect", "Signature", "Situation", "Unknown", "catalogue", "effect_named"]
+
+
+@lru_cache(maxsize=1)
+def _shipped() -> tuple[Effect, ...]:
+    found: list[Effect] = []
+    for module in sorted(pkgutil.iter_modules(__path__), key=lambda info: info.name):
+        found += getattr(import_module(f"{__name__}.{module.name}"), "EFFECTS", ())
+    return tuple(found)
+
+
+def catalogue(machine: Machine) -> tuple[Effect, ...]:
+    """Every shipped effect that is defined for ``machine``, in the order of their identifiers."""
+    return tuple(sorted((e for e in _shipped() if e.applies(machine)), key=lambda e: e.id))
+
+
+def effect_named(identifier: str, machine: Machine) -> Effect:
+    """Find an effect; raises BadInput for one that the machine does not have."""
+    here = {effect.id: effect for effect in catalogue(machine)}
+    if identifier in here:
+        return here[identifier]
+    elsewhere = any(effect.id == identifier for effect in _shipped())
+    raise BadInput(
+        f"the effect {identifier!r} is not defined for the machine {machine.name}"
+        if elsewhere
+        else f"unknown effect {identifier!r}",
+        remedy=f"Known for {machine.name}: {', '.join(here)}",
+    )

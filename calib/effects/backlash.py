@@ -1,0 +1,28 @@
+"""Lost motion: extension_i = -b_i/2 times the sign of the leg's last change."""
+
+from calib.arrays import Array
+from calib.effects.component import Effect, Signature, Situation, Unknown, limb_names, per_actuator
+from calib.runs.stack import Rows
+
+
+class Backlash(Effect):
+    """One lost motion for each actuator; zero before the actuator's first move."""
+
+    id = "backlash"
+    kind = "machine"
+    says = "a leg loses motion when it turns round: play in nut, bearing or gear"
+    depends = ("direction",)
+
+    def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
+        """``backlash.leg1`` ..., mm or rad."""
+        return tuple(
+            Unknown(f"backlash.{name}", a.unit, 0.02 if a.unit == "mm" else 1e-4)
+            for name, a in zip(limb_names(rows.machine), rows.machine.actuators, strict=True)
+        )
+
+    def signature(self, situation: Situation, values: Array) -> Signature:
+        """Half a step against the direction of approach."""
+        return Signature(extension=per_actuator(-0.5 * situation.rows.direction))
+
+
+EFFECTS = (Backlash(),)

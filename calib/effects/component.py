@@ -1,0 +1,170 @@
+"""What a physical effect is to the model: named unknowns and an analytic signature.
+
+An effect changes one or several of four things, and is linear in its unknowns but for those that
+it declares nonlinear (a period, a time constant, a moment):
+
+    extension of the actuators      (n, N)   mm or rad
+    parameters of the machine       (P, N)   mm or rad
+    nest where the SMR sits         (3, N)   mm, platform frame
+    point that the tracker reads    (3, N)   mm, tracker frame
+
+It answers with the derivative of those changes by each unknown (:class:`Signature`); the change
+itself is the sum of unknown times derivative over the linear unknowns. An effect is one module in
+``calib/effects`` with a tuple ``EFFECTS``; nothing else needs to know it.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from calib.arrays import Array
+from calib.mechanism.description import Machine
+from calib.runs.stack import Rows
+
+Kind = Literal["machine", "measurement"]
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One unknown of an effect.
+
+    ``size`` is how large it may reasonably be; ``sigma`` the standard deviation of its prior, or
+    None where the data alone should speak. ``nonlinear`` unknowns are searched for first.
+    """
+
+    name: str
+    unit: str
+    size: float
+    sigma: float | None = None
+    nonlinear: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """Where the machine stood at each of N readings, as the model sees it now.
+
+    Attributes
+    ----------
+    position, rotation : (3, N), (3, 3, N)
+        Platform in the base frame.
+    passive : (n_joints, N)
+        Passive coordinates; ``passive_home`` (n_joints,) the same at home.
+    actuator_twists : (n, 6, N)
+        Derivative of the platform's twist by each extension, base axes.
+    parameter_twists : (P, 6, N)
+        The same by each parameter.
+    base_point, point : (3, N)
+        SMR centre in the base frame and in the tracker frame, mm.
+    frame_rotation : (3, 3, N)
+        Base frame in the tracker frame.
+    """
+
+    rows: Rows
+    position: Array
+    rotation: Array
+    passive: Array
+    passive_home: Array
+    actuator_twists: Array
+    parameter_twists: Array
+    base_point: Array
+    point: Array
+    frame_rotation: Array
+
+    @property
+    def machine(self) -> Machine:
+        """The machine."""
+        return self.rows.machine
+
+    @cached_property
+    def length(self) -> Array:
+        """Nominal length of each actuator (reference + s), shape (n, N), mm."""
+        return self.machine.coordinates(self.rows.extension)
+
+
+@dataclass(frozen=True, eq=False)
+class Signature:
+    """Derivatives by each of U unknowns; None where the effect leaves a thing alone."""
+
+    extension: Array | None = None
+    """(U, n, N)"""
+    parameters: Array | None = None
+    """(U, P, N)"""
+    nest: Array | None = None
+    """(U, 3, N), platform frame"""
+    point: Array | None = None
+    """(U, 3, N), tracker frame"""
+
+
+class Effect(ABC):
+    """A physical effect that the plain geometric model misses.
+
+    Attributes
+    ----------
+    id : str
+        Stable identifier for command line, JSON and reports.
+    kind : "machine" or "measurement"
+        Measurement effects explain residuals and are never written to a machine.
+    says : str
+        One sentence for the operator.
+    channels : tuple of str
+        Channels that a reading must have; readings without are left out for this effect.
+    depends : tuple of str
+        Columns of :class:`Rows` on which the extensions depend beside the pose.
+    """
+
+    id: str
+    kind: Kind
+    says: str
+    channels: tuple[str, ...] = ()
+    depends: tuple[str, ...] = ()
+
+    def applies(self, machine: Machine) -> bool:
+        """Tell whether the effect is defined for this machine."""
+        return bool(machine.actuators)
+
+    def unavailable(self, rows: Rows) -> str:
+        """Say why these readings cannot show the effect; empty if they can."""
+        for name in self.channels:
+            if name not in rows.channels:
+                return f"the run has no column {name}"
+            if not np.isfinite(rows.channels[name][rows.on_platform]).any():
+                return f"the column {name} is empty"
+        return ""
+
+    @abstractmethod
+    def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
+        """Name the unknowns."""
+
+    def trials(self, rows: Rows) -> Iterator[tuple[float, ...]]:
+        """Values of the nonlinear unknowns to be searched, in the order of the unknowns."""
+        yield ()
+
+    @abstractmethod
+    def signature(self, situation: Situation, values: Array) -> Signature:
+        """Derivatives at ``values`` (U,)."""
+
+
+def limb_names(machine: Machine) -> list[str]:
+    """Name of the limb that each actuator drives, or of the actuator where several share it."""
+    names = []
+    for index, actuator in enumerate(machine.actuators):
+        driven = [
+            limb.name
+            for limb in machine.limbs
+            for element in limb.elements
+            if any(term.kind == "actuator" and term.index == index for term in element.terms)
+        ]
+        names.append(driven[0] if len(set(driven)) == 1 else actuator.name)
+    return names
+
+
+def per_actuator(shape: Array) -> Array:
+    """One unknown for each actuator: (n, N) -> (n, n, N) with ``shape`` on the diagonal."""
+    count = shape.shape[0]
+    spread = np.zeros((count, *shape.shape))
+    spread[np.arange(count), np.arange(count)] = shape
+    return spread

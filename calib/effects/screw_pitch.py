@@ -1,0 +1,24 @@
+"""Every screw has its own gain: extension_i = g_i s_i."""
+
+from calib.arrays import Array
+from calib.effects.component import Effect, Signature, Situation, Unknown, limb_names, per_actuator
+from calib.runs.stack import Rows
+
+
+class ScrewPitch(Effect):
+    """One relative gain for each actuator."""
+
+    id = "screw-pitch"
+    kind = "machine"
+    says = "each screw has its own gain: its real lead differs from the drawing's"
+
+    def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
+        """``screw-pitch.leg1`` ..., a ratio."""
+        return tuple(Unknown(f"screw-pitch.{name}", "1", 1e-3) for name in limb_names(rows.machine))
+
+    def signature(self, situation: Situation, values: Array) -> Signature:
+        """Commanded extension."""
+        return Signature(extension=per_actuator(situation.rows.extension))
+
+
+EFFECTS = (ScrewPitch(),)

@@ -1,0 +1,73 @@
+"""First guess of the base frame in the tracker frame: rigid alignment of the nests.
+
+The closed form is Kabsch's (Acta Cryst. A32, 1976): with centred points, R = V diag(1, 1, d) U^T
+from the singular value decomposition of sum b p^T. Readings that do not fit the majority are left
+out: they are tried against random triples of readings.
+"""
+
+import numpy as np
+
+from calib.arrays import Array, BoolArray
+
+TRIPLES = 400
+
+
+def align(base: Array, tracker: Array) -> tuple[Array, Array]:
+    """Rotation (3, 3) and translation (3,) that take points (3, N) of base to tracker best."""
+    centre_b, centre_t = base.mean(axis=1), tracker.mean(axis=1)
+    u, _, vt = np.linalg.svd((base - centre_b[:, None]) @ (tracker - centre_t[:, None]).T)
+    handed = np.sign(np.linalg.det(vt.T @ u.T))
+    rotation = vt.T @ np.diag([1.0, 1.0, handed]) @ u.T
+    return rotation, centre_t - rotation @ centre_b
+
+
+def misfit(base: Array, tracker: Array, rotation: Array, position: Array) -> Array:
+    """Distance (N,) between tracker points and aligned base points, mm."""
+    apart = tracker - rotation @ base - position[:, None]
+    return np.asarray(np.sqrt(np.sum(apart * apart, axis=0)))
+
+
+def collinear(points: Array) -> bool:
+    """Tell whether points (3, N) lie on a line, so that they cannot tie a frame."""
+    if points.shape[1] < 3:
+        return True
+    spread = np.linalg.svd(points - points.mean(axis=1)[:, None], compute_uv=False)
+    return bool(spread[1] < 1e-3 * spread[0] or spread[0] == 0.0)
+
+
+def robust_align(base: Array, tracker: Array, slack: Array) -> tuple[Array, Array, BoolArray]:
+    """Align while readings that cannot be right are left out.
+
+    Parameters
+    ----------
+    base, tracker : (3, N)
+        Expected points, and what was read.
+    slack : (N,)
+        How far apart, in mm, a good pair may be.
+
+    Returns
+    -------
+    rotation (3, 3), position (3,), inside (N,) bool
+    """
+    rotation, position = align(base, tracker)
+    inside = misfit(base, tracker, rotation, position) < slack
+    if inside.all():
+        return rotation, position, inside
+    generator = np.random.default_rng(0)  # the same triples every time: a fit is a pure function
+    best = inside
+    for _ in range(TRIPLES):
+        three = generator.choice(base.shape[1], 3, replace=False)
+        if collinear(base[:, three]):
+            continue
+        trial = misfit(base, tracker, *align(base[:, three], tracker[:, three])) < slack
+        if trial.sum() > best.sum():
+            best = trial
+    for _ in range(5):
+        if best.sum() < 3:
+            break
+        rotation, position = align(base[:, best], tracker[:, best])
+        again = misfit(base, tracker, rotation, position) < slack
+        if np.array_equal(again, best):
+            break
+        best = again
+    return rotation, position, best

@@ -1,0 +1,116 @@
+"""Readings that cannot be right: the wrong hole, and strays. Flagged with a reason, never dropped.
+
+A gross fault is seen before the fit, against the nominal machine: the tracker saw the SMR where
+another nest stands, or where none is. A smaller stray is seen in the fit: letting that one reading
+move freely lowers chi-square by d = e^T (I - H_ii)^-1 e (e whitened, H_ii its block of the hat
+matrix). d/3 is compared with the misfit of all the others, so that a missing effect, which bends
+every reading, does not make bad readings of good ones.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from calib.arrays import Array, BoolArray
+from calib.runs.stack import Rows
+
+FALSE_ALARM = 1e-3
+"""Probability that a run without a stray has a reading flagged."""
+MOST_STRAYS = 0.1
+"""Part of the readings beyond which misfit is no matter of single readings."""
+CLEARLY = 5.0
+"""A stray misses by this many times the RMS misfit of the others at least."""
+
+
+@dataclass(frozen=True)
+class BadReading:
+    """A reading that is excluded: its index among the rows, its line, and why."""
+
+    row: int
+    run: int
+    line: int
+    why: str
+
+
+def wrong_place(rows: Rows, row: int, expected: dict[str, Array], slack: float) -> str:
+    """Say where a reading that fits its label badly belongs.
+
+    Parameters
+    ----------
+    rows : Rows
+    row : int
+        Which reading.
+    expected : dict of (3,)
+        Where each nest stood at that moment, tracker frame, by the nominal machine, mm.
+    slack : float
+        How far, in mm, the nominal machine may be off.
+    """
+    label = rows.nest_name[row]
+    apart = {n: float(np.linalg.norm(rows.position[:, row] - p)) for n, p in expected.items()}
+    nearest = min(apart, key=lambda name: apart[name])
+    if nearest != label and apart[nearest] < slack:
+        return f"reads as nest {nearest}, was labelled {label}"
+    return f"{_mm(apart[label])} from where nest {label} is, and in no other nest"
+
+
+def _mm(distance: float) -> str:
+    return f"{distance:.3g} mm" if distance >= 1.0 else f"{1000 * distance:.3g} um"
+
+
+def strays(
+    whitened: Array, jacobian: Array, prior_precision: Array, candidates: BoolArray
+) -> list[int]:
+    """Find strays among accepted readings, worst first, each judged without those before it.
+
+    Parameters
+    ----------
+    whitened : (3, N)
+        Residuals in sigmas at the optimum of the fit to ``candidates``.
+    jacobian : (p, 3, N)
+        Whitened derivatives.
+    prior_precision : (p,)
+        1 / sigma^2 of the priors.
+    candidates : (N,) bool
+        Readings in the fit.
+    """
+    accepted = candidates.copy()
+    flat = np.where(accepted, jacobian, 0.0)
+    normal = flat.reshape(flat.shape[0], -1) @ flat.reshape(flat.shape[0], -1).T
+    normal += np.diag(prior_precision)
+    step = np.zeros(flat.shape[0])
+    found: list[int] = []
+    while len(found) < MOST_STRAYS * candidates.sum():
+        index, moved = _worst(whitened, jacobian, normal, step, accepted)
+        if index is None:
+            break
+        found.append(index)
+        accepted[index] = False
+        block = jacobian[:, :, index]
+        normal = normal - block @ block.T
+        step = moved
+    return found
+
+
+def _worst(
+    whitened: Array, jacobian: Array, normal: Array, step: Array, accepted: BoolArray
+) -> tuple[int | None, Array]:
+    """Most suspicious reading, or None; and the step of the fit once it is left out."""
+    scale = 1.0 / np.sqrt(np.diag(normal))
+    inverse = np.linalg.inv(normal * scale[:, None] * scale) * scale[:, None] * scale
+    count = accepted.size
+    flat = jacobian.reshape(jacobian.shape[0], -1)
+    spread = (inverse @ flat).reshape(jacobian.shape)
+    hat = np.einsum("pin,pjn->nij", jacobian, spread)
+    residual = (whitened - np.tensordot(step, jacobian, axes=1)).T
+    freed = np.linalg.solve(np.eye(3) - hat, residual[:, :, None])[:, :, 0]
+    drop = np.where(accepted, np.sum(residual * freed, axis=1), 0.0)
+    total = float(np.sum(residual[accepted] ** 2)) + 0.0
+    dof = 3.0 * accepted.sum() - float(np.einsum("nii->n", hat)[accepted].sum())
+    worst = int(np.argmax(drop))
+    others = max((total - drop[worst]) / max(dof - 3.0, 1.0), 1.0)
+    ratio = drop[worst] / 3.0 / others
+    chance = count * float(stats.f.sf(ratio, 3, max(dof - 3.0, 1.0)))
+    if chance > FALSE_ALARM or ratio < CLEARLY**2 / 3.0:
+        return None, step
+    return worst, step - spread[:, :, worst] @ freed[worst]

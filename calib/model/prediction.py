@@ -1,0 +1,351 @@
+"""What the tracker should read, and how that changes with every unknown.
+
+A reading of run k in a platform nest n, taken at extension s:
+
+    p = f_effects( R_k (x + X (n + dn)) + t_k ),   (x, X) = pose( s + ds ; parameters + dp )
+
+and of a base nest b: p = f_effects(R_k b + t_k). (R_k, t_k) is the base frame in the tracker frame
+of that run; ds, dp, dn and f come from the effects. The unknowns in order: the machine's
+parameters that have a prior, the effects' unknowns, six for each frame (dt in mm, then a rotation
+vector dw in rad about the tracker's axes, R <- exp(dw) R).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from calib.arrays import Array, BoolArray, IntArray
+from calib.effects.component import Effect, Signature, Situation, Unknown
+from calib.errors import BadInput
+from calib.mechanism.description import Machine
+from calib.mechanism.jacobian import pose_jacobians
+from calib.mechanism.rigid import cross, exponential, product, rotate
+from calib.mechanism.solve import Configuration, forward, home_configuration
+from calib.runs.stack import Rows
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Values of all unknowns, and the configurations that belong to them.
+
+    ``parameters`` (P,), ``effects`` one (U,) for each effect, ``frame_rotation`` (3, 3, K) and
+    ``frame_position`` (3, K) the base frame in the tracker frame of each run.
+    """
+
+    parameters: Array
+    effects: tuple[Array, ...]
+    frame_rotation: Array
+    frame_position: Array
+    configuration: Configuration | None = None
+    situation: Situation | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """The model near a state.
+
+    ``residual`` (3, N) is measured minus predicted, mm, tracker frame; ``whitened`` (3, N) the
+    same in sigmas; ``jacobian`` (p, 3, N) the whitened derivative of the prediction.
+    """
+
+    state: State
+    residual: Array
+    whitened: Array
+    jacobian: Array
+
+    @property
+    def situation(self) -> Situation:
+        """Where the machine stood."""
+        assert self.state.situation is not None
+        return self.state.situation
+
+
+class Model:
+    """Baseline plus effects, for the readings of one or several runs.
+
+    Parameters
+    ----------
+    rows : Rows
+    effects : sequence of Effect
+        In the order in which they were added; combinations act together.
+    """
+
+    def __init__(self, rows: Rows, effects: Sequence[Effect] = ()) -> None:
+        self.rows = rows
+        self.effects = tuple(effects)
+        self.machine: Machine = rows.machine
+        for effect in self.effects:
+            if reason := effect.unavailable(rows):
+                raise BadInput(
+                    f"the effect {effect.id} cannot be in the model: {reason}",
+                    remedy="Leave it out, or measure with what it needs",
+                )
+
+    @cached_property
+    def free(self) -> IntArray:
+        """Indices of the machine's parameters that are unknown (their prior is not zero)."""
+        return np.flatnonzero(self.machine.prior_sigma > 0)
+
+    @cached_property
+    def unknowns(self) -> tuple[tuple[Unknown, ...], ...]:
+        """Unknowns of every effect."""
+        return tuple(effect.unknowns(self.rows) for effect in self.effects)
+
+    @cached_property
+    def frames(self) -> int:
+        """Number of base frames, one for each run."""
+        return len(self.rows.runs)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of all unknowns, in order."""
+        parameters = tuple(self.machine.parameters[index].name for index in self.free)
+        prefix = [f"run{k + 1}.frame" if self.frames > 1 else "frame" for k in range(self.frames)]
+        frame = tuple(f"{p}.{c}" for p in prefix for c in ("x", "y", "z", "rx", "ry", "rz"))
+        return parameters + tuple(u.name for group in self.unknowns for u in group) + frame
+
+    @cached_property
+    def prior(self) -> Array:
+        """Standard deviation of the prior of every unknown (p,); infinite for frames.
+
+        Unknowns of effects without a prior of their own get a thousand times their size: enough
+        to keep collinear effects solvable, too weak to bias anything.
+        """
+        effects = [u.sigma or 1e3 * u.size for group in self.unknowns for u in group]
+        parameters = self.machine.prior_sigma[self.free]
+        return np.concatenate([parameters, effects, np.full(6 * self.frames, np.inf)])
+
+    @cached_property
+    def centre(self) -> Array:
+        """Mean of the prior of every unknown (p,); zero for effects and frames."""
+        centre = np.zeros(self.prior.size)
+        centre[: self.free.size] = self.machine.nominal[self.free]
+        return centre
+
+    @cached_property
+    def usable(self) -> BoolArray:
+        """Readings that have every channel that the effects need."""
+        usable = np.ones(self.rows.count, dtype=bool)
+        for effect in self.effects:
+            usable &= channels_known(effect, self.rows)
+        return usable
+
+    @cached_property
+    def _states(self) -> tuple[IntArray, IntArray]:
+        """Representative readings (M,) of distinct machine states, and each reading's state."""
+        depends = dict.fromkeys(name for e in self.effects for name in e.depends)
+        columns = [self.rows.column(n) for n in depends if self._has(n)]
+        key = np.nan_to_num(np.concatenate([self.rows.extension, *columns]))
+        _, first, inverse = np.unique(key, axis=1, return_index=True, return_inverse=True)
+        return first, inverse.reshape(-1)
+
+    def _has(self, name: str) -> bool:
+        fixed = ("q", "direction", "step", "extension", "time_s", "progress", "run")
+        return name in fixed or name in self.rows.channels
+
+    def start(self, rotation: Array, position: Array) -> State:
+        """Nominal parameters, no effect, given frames (3, 3, K), (3, K)."""
+        effects = tuple(np.zeros(len(group)) for group in self.unknowns)
+        return State(self.machine.nominal.copy(), effects, rotation, position)
+
+    def base_points(self) -> Array:
+        """SMR centres (3, N) of the nominal machine in the base frame, mm."""
+        first, inverse = self._states
+        poses = self._closed(self.rows.extension[:, first], self.machine.nominal, None).poses
+        turned = rotate(poses.rotation[:, :, inverse], self.rows.nest)
+        return np.where(
+            self.rows.on_platform, poses.position[:, inverse] + turned, self.rows.nest
+        )
+
+    def linearise(self, state: State) -> Linearised:
+        """Predict all readings and differentiate.
+
+        Raises
+        ------
+        BadInput
+            Naming the reading at which the machine does not close.
+        """
+        first, inverse = self._states
+        rows = self.rows
+        before = self._signatures(state)
+        extension = rows.extension + _change(before, "extension", rows.extension)
+        parameters: Array = state.parameters
+        if any(s.parameters is not None for _, s in before):
+            held = np.repeat(state.parameters[:, None], rows.count, axis=1)
+            parameters = (held + _change(before, "parameters", held))[:, first]
+        closed = self._closed(extension[:, first], parameters, state.configuration)
+        jacobians = pose_jacobians(self.machine, closed, parameters)
+        nest = rows.nest + _change(before, "nest", rows.nest)
+        rotation = closed.poses.rotation[:, :, inverse]
+        arm = rotate(rotation, nest)
+        base = np.where(rows.on_platform, closed.poses.position[:, inverse] + arm, rows.nest)
+        turn = state.frame_rotation[:, :, rows.run]
+        turned = rotate(turn, base)
+        point = turned + state.frame_position[:, rows.run]
+        situation = Situation(
+            rows=rows,
+            position=closed.poses.position[:, inverse],
+            rotation=rotation,
+            passive=closed.passive[:, inverse],
+            passive_home=home_configuration(self.machine).passive[:, 0],
+            actuator_twists=jacobians.actuators[:, :, inverse],
+            parameter_twists=jacobians.parameters[:, :, inverse],
+            base_point=base,
+            point=point,
+            frame_rotation=turn,
+        )
+        now = replace(state, configuration=closed, situation=situation)
+        signatures = self._signatures(now)
+        residual = rows.position - point - _change(signatures, "point", point)
+        combined = _combine(rows.whitener, turn)
+        lever = _lever(combined, arm, rows.on_platform)
+        parts = [_through(lever, situation.parameter_twists[self.free])]
+        parts += [whitened_columns(signature, situation) for _, signature in signatures]
+        parts += self._frame_columns(turned)
+        return Linearised(now, residual, _apply(rows.whitener, residual), np.concatenate(parts))
+
+    def _closed(
+        self, extension: Array, parameters: Array, start: Configuration | None
+    ) -> Configuration:
+        closed = forward(self.machine, extension, parameters, start)
+        if not closed.converged.all():
+            state = int(np.argmin(closed.converged))
+            row = int(self._states[0][state])
+            raise BadInput(
+                "the machine does not close at these actuator coordinates",
+                place=self.rows.place(row),
+                remedy="Check q1.. of this row, and that the run belongs to this machine",
+            )
+        return closed
+
+    def _signatures(self, state: State) -> list[tuple[Array, Signature]]:
+        """Linear amplitudes (U,) and signature of every effect; none before the first closure."""
+        if state.situation is None:
+            return []
+        answers = []
+        for effect, group, values in zip(self.effects, self.unknowns, state.effects, strict=True):
+            linear = np.where([u.nonlinear for u in group], 0.0, values)
+            answers.append((linear, effect.signature(state.situation, values)))
+        return answers
+
+    def _frame_columns(self, turned: Array) -> list[Array]:
+        rows = self.rows
+        columns = []
+        for run in range(self.frames):
+            here = (rows.run == run).astype(np.float64)
+            for axis in range(3):
+                columns.append(rows.whitener[:, axis] * here)
+            for axis in range(3):
+                moved = cross(np.eye(3)[axis][:, None], turned)
+                columns.append(_apply(rows.whitener, moved) * here)
+        return [np.array(columns)]
+
+    def moved(self, state: State, step: Array) -> State:
+        """Take a step (p,) of all unknowns; the configuration stays as a warm start."""
+        parameters = state.parameters.copy()
+        parameters[self.free] += step[: self.free.size]
+        at, effects = self.free.size, []
+        for values in state.effects:
+            effects.append(values + step[at : at + values.size])
+            at += values.size
+        frame = step[at:].reshape(self.frames, 6).T
+        return replace(
+            state,
+            parameters=parameters,
+            effects=tuple(effects),
+            frame_rotation=product(exponential(frame[3:]), state.frame_rotation),
+            frame_position=state.frame_position + frame[:3],
+        )
+
+    def deviation(self, state: State) -> Array:
+        """Distance (p,) of every unknown from the mean of its prior, in its own unit."""
+        own = np.concatenate([state.parameters[self.free], *state.effects])
+        deviation = np.zeros(self.prior.size)
+        deviation[: own.size] = own - self.centre[: own.size]
+        return deviation
+
+
+def channels_known(effect: Effect, rows: Rows) -> BoolArray:
+    """Readings (N,) that have every channel that an effect needs (reference readings always)."""
+    known = np.ones(rows.count, dtype=bool)
+    for name in (*effect.channels, *effect.depends):
+        if name in rows.channels:
+            known &= np.isfinite(rows.channels[name])
+    return known | ~rows.on_platform if effect.kind == "machine" else known
+
+
+def whitened_columns(signature: Signature, situation: Situation) -> Array:
+    """Whitened derivative (U, 3, N) of the readings by an effect's unknowns."""
+    rows = situation.rows
+    whitener = rows.whitener
+    combined = _combine(whitener, situation.frame_rotation)
+    arm = situation.base_point - situation.position
+    total: Array | float = 0.0
+    lever = _lever(combined, arm, rows.on_platform)
+    if signature.extension is not None:
+        shape = np.nan_to_num(signature.extension)
+        twists = _contract(shape, situation.actuator_twists)
+        total = total + _through(lever, twists)
+    if signature.parameters is not None:
+        twists = _contract(np.nan_to_num(signature.parameters), situation.parameter_twists)
+        total = total + _through(lever, twists)
+    if signature.nest is not None:
+        turned = np.stack([rotate(situation.rotation, shape) for shape in signature.nest])
+        total = total + _apply_each(combined * rows.on_platform, turned)
+    if signature.point is not None:
+        total = total + _apply_each(whitener, np.nan_to_num(signature.point))
+    return np.asarray(total)
+
+
+def _contract(shape: Array, twists: Array) -> Array:
+    """Sum over actuators: (U, n, N) and (n, 6, N) -> (U, 6, N), skipping what is zero."""
+    out = np.zeros((shape.shape[0], 6, shape.shape[2]))
+    for unknown, actuator in zip(*np.nonzero(np.any(shape, axis=2)), strict=True):
+        out[unknown] += shape[unknown, actuator] * twists[actuator]
+    return out
+
+
+def _change(signatures: list[tuple[Array, Signature]], what: str, like: Array) -> Array:
+    total = np.zeros_like(like)
+    for linear, signature in signatures:
+        shape = getattr(signature, what)
+        if shape is not None:
+            total += np.nan_to_num(np.tensordot(linear, shape, axes=1))
+    return total
+
+
+def _combine(whitener: Array, turn: Array) -> Array:
+    """Whitener times frame rotation, (3, 3, N)."""
+    return np.stack([_apply(whitener, turn[:, j]) for j in range(3)], axis=1)
+
+
+def _lever(combined: Array, arm: Array, on_platform: BoolArray) -> Array:
+    """Matrix (3, 6, N) from the platform's twist to the whitened reading; zero for base nests."""
+    lever = np.empty((3, 6, arm.shape[1]))
+    lever[:, :3] = combined
+    for axis in range(3):
+        lever[:, 3 + axis] = _apply(combined, cross(np.eye(3)[axis][:, None], arm))
+    lever *= on_platform
+    return lever
+
+
+def _through(lever: Array, twists: Array) -> Array:
+    """(3, 6, N) and (U, 6, N) -> (U, 3, N)."""
+    out = np.empty((twists.shape[0], 3, twists.shape[2]))
+    for row in range(3):
+        out[:, row] = np.einsum("kn,ukn->un", lever[row], twists)
+    return out
+
+
+def _apply(matrix: Array, vector: Array) -> Array:
+    """(3, 3, N) and (3, N) -> (3, N)."""
+    out: Array = np.einsum("ijn,jn->in", matrix, vector)
+    return out
+
+
+def _apply_each(matrix: Array, vectors: Array) -> Array:
+    """(3, 3, N) and (U, 3, N) -> (U, 3, N)."""
+    out: Array = np.einsum("ijn,ujn->uin", matrix, vectors)
+    return out

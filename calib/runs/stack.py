@@ -1,0 +1,149 @@
+"""The readings of one or several runs of a machine, stacked for the model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from calib.arrays import Array, BoolArray, IntArray
+from calib.errors import BadInput
+from calib.mechanism.description import Machine
+from calib.runs.record import Run, approach, holdout_folds
+
+STEP_MM = 1e-4
+STEP_RAD = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """N readings of K runs; rows without a reading have left their mark in ``direction``.
+
+    Attributes
+    ----------
+    run, line : (N,)
+        Run index 0..K-1, and line in that run's ``points.csv``.
+    extension, q : (n, N)
+        Commanded extension s by the controller's own parameters, and coordinate q.
+    direction, step : (n, N)
+        Sign and size of each actuator's last change (0 before the first).
+    time_s, progress : (N,)
+        Seconds from the start of the run, and the same as 0..1 over the run.
+    position, covariance : (3, N), (3, 3, N)
+        What the tracker read, mm, tracker frame.
+    nest : (3, N)
+        SMR centre where it was put: platform frame if ``on_platform``, else base frame, mm.
+    fold : (N,)
+        Hold-out fold of whole poses, -1 for reference readings.
+    channels : dict of (N,)
+        State readings; nan where a run has none.
+    """
+
+    machine: Machine
+    runs: tuple[Run, ...]
+    run: IntArray
+    line: IntArray
+    pose_name: tuple[str, ...]
+    nest_name: tuple[str, ...]
+    extension: Array
+    q: Array
+    direction: Array
+    step: Array
+    time_s: Array
+    progress: Array
+    position: Array
+    covariance: Array
+    nest: Array
+    on_platform: BoolArray
+    fold: IntArray
+    channels: dict[str, Array]
+
+    @property
+    def count(self) -> int:
+        """Number of readings N."""
+        return self.run.size
+
+    @cached_property
+    def whitener(self) -> Array:
+        """Inverse Cholesky factors (3, 3, N): whitened residual = whitener @ residual."""
+        factors = np.linalg.cholesky(np.moveaxis(self.covariance, -1, 0))
+        return np.moveaxis(np.linalg.inv(factors), 0, -1)
+
+    def column(self, name: str) -> Array:
+        """State columns (k, N) by name: q, direction, step, time_s, progress or a channel."""
+        if name in ("q", "direction", "step", "extension"):
+            values: Array = getattr(self, name)
+            return values
+        if name in ("time_s", "progress"):
+            return np.asarray(getattr(self, name))[None]
+        if name == "run":
+            return self.run[None].astype(np.float64)
+        return self.channels[name][None]
+
+    def place(self, row: int) -> str:
+        """Where a reading stands, for messages."""
+        return f"{self.runs[self.run[row]].source}, line {self.line[row]}"
+
+
+def stack(machine: Machine, runs: Sequence[Run]) -> Rows:
+    """Stack the readings of ``runs`` (in order, each with its own frame and drift).
+
+    Raises
+    ------
+    BadInput
+        For a controller parameter that the machine does not have.
+    """
+    if not runs:
+        raise BadInput("no run is given", remedy="Name at least one run's folder")
+    threshold = np.array([STEP_MM if a.unit == "mm" else STEP_RAD for a in machine.actuators])
+    parts = [_part(machine, run, index, threshold) for index, run in enumerate(runs)]
+    names = dict.fromkeys(name for run in runs for name in run.channels)
+    return Rows(
+        machine=machine,
+        runs=tuple(runs),
+        pose_name=tuple(name for part in parts for name in part.pose_name),
+        nest_name=tuple(name for part in parts for name in part.nest_name),
+        channels={
+            name: np.concatenate(
+                [part.channels.get(name, np.full(part.count, np.nan)) for part in parts]
+            )
+            for name in names
+        },
+        **{
+            field: np.concatenate([getattr(part, field) for part in parts], axis=-1)
+            for field in (
+                "run", "line", "extension", "q", "direction", "step", "time_s", "progress",
+                "position", "covariance", "nest", "on_platform", "fold",
+            )
+        },
+    )  # fmt: skip
+
+
+def _part(machine: Machine, run: Run, index: int, threshold: Array) -> Rows:
+    """One run's readings; the direction of approach is taken over all its rows."""
+    rows = np.flatnonzero(run.measured)
+    direction, step = approach(run.q, threshold)
+    nests = {**run.header.platform_nests, **run.header.base_nests}
+    names = tuple(run.nest[row] for row in rows)
+    span = float(np.ptp(run.time_s))
+    progress = (run.time_s - run.time_s[0]) / span if span > 0 else np.zeros_like(run.time_s)
+    return Rows(
+        machine=machine,
+        runs=(run,),
+        run=np.full(rows.size, index, dtype=np.intp),
+        line=run.line[rows].astype(np.intp),
+        pose_name=tuple(run.pose[row] for row in rows),
+        nest_name=names,
+        extension=machine.extension(run.q[:, rows], run.header.controller_parameters),
+        q=run.q[:, rows],
+        direction=direction[:, rows],
+        step=step[:, rows],
+        time_s=run.time_s[rows],
+        progress=progress[rows],
+        position=run.position[:, rows],
+        covariance=run.covariance[:, :, rows],
+        nest=np.array([nests[name] for name in names]).T,
+        on_platform=np.array([name in run.header.platform_nests for name in names]),
+        fold=holdout_folds(run)[rows].astype(np.intp),
+        channels={name: values[rows] for name, values in run.channels.items()},
+    )
