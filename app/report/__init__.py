@@ -1,0 +1,1 @@
+"""What a session leaves for people: one self-contained HTML page with figures."""
