@@ -1,33 +1,197 @@
-"""The one physical machine behind a station's servers."""
+"""The one physical hexapod behind a station's servers, and the room around it.
 
-import threading
+Everything is a function of machine time, so any thread may ask for any instant and nothing has
+to be stepped. Poses come from the closed form in ``mocks.physics.hexapod``.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from mocks.clock import Clock, ScaledClock
 from mocks.faults import FaultSet
+from mocks.physics.climate import Climate
+from mocks.physics.extension import Circumstances, LegErrors, Load, lengths, play_widths
+from mocks.physics.hexapod import (
+    Array,
+    HexapodGeometry,
+    Legs,
+    Pose,
+    forward,
+    geometry,
+    home_pose,
+    rotation_from_vector,
+)
+from mocks.physics.hidden import Hidden
 from mocks.physics.motion import LegMotion
+from mocks.physics.room import (
+    BASE_NESTS,
+    HOME_REFLECTOR,
+    PLATFORM_NESTS,
+    Distortions,
+    Station,
+)
+from mocks.physics.signals import Steps
+from mocks.physics.truth import draw_parameters, machine_file
+from mocks.smrs import BIRDBATH, HAND, Smrs
+
+HAND_AWAY = (0.0, 0.0, -1000.0)
+
+
+@dataclass(frozen=True)
+class WorldPlan:
+    """How a world is made.
+
+    ``parameters`` are the true ones (drawn by ``seed`` if None); ``smrs`` how many SMRs there
+    are: 1 in the birdbath, 3 in the platform's nests, 7 in all nests.
+    """
+
+    seed: int = 1
+    parameters: Mapping[str, float] | None = None
+    hidden: Hidden = field(default_factory=Hidden)
+    load: Load = field(default_factory=Load)
+    smrs: int = 1
 
 
 class World:
-    """Legs, temperature, payload and faults on one machine clock."""
+    """Legs, platform, SMRs, tracker station, climate and faults on one machine clock."""
 
-    def __init__(self, clock: Clock | None = None, seed: int = 1) -> None:
+    def __init__(self, clock: Clock | None = None, plan: WorldPlan | None = None) -> None:
+        plan = plan or WorldPlan()
         self.clock: Clock = clock or ScaledClock()
-        self.seed = seed
+        self.plan = plan
+        self.machine = machine_file("hexapod")
+        given = plan.parameters
+        self.parameters: dict[str, float] = (
+            dict(given) if given is not None else draw_parameters(self.machine, plan.seed)
+        )
         self.faults = FaultSet()
-        self.legs = [LegMotion(self.clock) for _ in range(6)]
-        self._lock = threading.RLock()
-        self._payload_kg = 0.0
+        self.climate = Climate(plan.seed)
+        self.station = Station(plan.seed)
+        self.distortions = Distortions(plan.hidden)
+        self.legs = [LegMotion(self.clock, widths) for widths in play_widths(plan.hidden)]
+        self.smrs = _smrs(plan.smrs)
+        self._errors = LegErrors(plan.hidden, plan.load)
+        self._geometry = true_geometry(self.parameters, plan.hidden)
+        self._home_twist = home_twist(self._geometry)
+        self._payload = Steps(np.zeros(()))
+        self._jump = Steps(np.zeros(6))
+        self._last: Pose | None = None
 
     @property
     def payload_kg(self) -> float:
         """Mass of the payload on the platform, kg."""
-        return self._payload_kg
+        return float(self._payload.last)
 
     @payload_kg.setter
     def payload_kg(self, mass: float) -> None:
-        with self._lock:
-            self._payload_kg = float(mass)
+        self._payload.set(self.clock.now(), np.asarray(mass))
 
     def structure_temp_C(self) -> float:  # noqa: N802 (the unit's own capital)
         """Temperature of the machine's structure now, deg C, as its sensor reads it."""
-        return 20.0
+        return round(float(self.climate.structure(np.array([self.clock.now()]))[0]), 3)
+
+    def jump_tracker(self, move: Array) -> None:
+        """Somebody knocks the tracker's stand: ``move`` (6,) = mm and rad, tracker frame."""
+        self._jump.set(self.clock.now(), self._jump.last + np.asarray(move, dtype=float))
+
+    def pose(self, times: Array) -> Pose:
+        """True poses of the platform in the base frame at ``times`` (N,)."""
+        circumstances = self._circumstances(times)
+        start = self._start(times.size)
+        pose = solve_pose(self._geometry, self._errors, circumstances, self._home_twist, start)
+        self._last = Pose(pose.position[-1:], pose.rotation[-1:])
+        return pose
+
+    def encoder_extension(self) -> Array:
+        """Extension of every leg as its encoder reads it now, (6,), mm."""
+        return np.array([leg.position() for leg in self.legs])
+
+    def smr_in_tracker(self, smr: str, times: Array) -> Array:
+        """Where the centre of an SMR really is at ``times`` (N,), tracker frame, (N, 3), mm."""
+        place = self.smrs.places[smr]
+        if place == BIRDBATH:
+            return np.tile(HOME_REFLECTOR, (times.size, 1))
+        if place == HAND:
+            return np.tile(HAND_AWAY, (times.size, 1))
+        return self.nest_in_tracker(place, times, self.smrs.centre_off_mm(smr))
+
+    def nest_in_tracker(self, nest: str, times: Array, off_mm: float = 0.0) -> Array:
+        """Where a nest really is at ``times`` (N,), tracker frame, (N, 3), mm."""
+        up = np.array([0.0, 0.0, off_mm])
+        if nest in PLATFORM_NESTS:
+            pose = self.pose(times)
+            down = -pose.rotation[:, 2, :]
+            centre = np.asarray(PLATFORM_NESTS[nest]) + up
+            base = pose.points(self.distortions.nest(nest, centre, times, down))
+        else:
+            centre = np.asarray(BASE_NESTS[nest]) + up
+            base = self.distortions.nest(nest, centre, times, np.zeros((times.size, 3)))
+        return self._to_tracker(base, times)
+
+    def _to_tracker(self, base: Array, times: Array) -> Array:
+        points = self.station.to_tracker(self.distortions.base(base, times))
+        jump = self._jump.at(times)
+        turned = np.einsum("nij,nj->ni", rotation_from_vector(jump[:, 3:]), points)
+        return np.asarray(turned + jump[:, :3])
+
+    def _circumstances(self, times: Array) -> Circumstances:
+        history = [leg.history(times) for leg in self.legs]
+        return Circumstances(
+            extension=np.stack([h.extension for h in history], axis=1),
+            play=np.stack([h.play for h in history], axis=1),
+            step=np.stack([h.step for h in history], axis=1),
+            delay=np.stack([h.delay for h in history], axis=1),
+            structure=self.climate.structure(times),
+            air=self.climate.air(times),
+            payload=self._payload.at(times),
+        )
+
+    def _start(self, count: int) -> Pose:
+        if self._last is None:
+            return home_pose(count)
+        last = self._last
+        return Pose(np.repeat(last.position, count, 0), np.repeat(last.rotation, count, 0))
+
+
+def true_geometry(parameters: Mapping[str, float], hidden: Hidden) -> HexapodGeometry:
+    """Geometry with the hidden tilts of the joints' first axes."""
+
+    def tilt(side: str) -> Array:
+        columns = [
+            sum(hidden.legs(f"joint-tilt.*.{side}{mark}{axis}") for mark in ("", "_", "."))
+            for axis in "yz"
+        ]
+        return np.stack([np.asarray(c) for c in columns], axis=1)
+
+    return geometry(parameters, tilt("B"), tilt("P"))
+
+
+def home_twist(g: HexapodGeometry) -> Array:
+    """Twist of each leg at zero extension, (6,), rad."""
+    _, legs = forward(g, lambda legs, pose: g.L0[None, :], home_pose(1))
+    return np.asarray(legs.twist()[0])
+
+
+def solve_pose(
+    g: HexapodGeometry, errors: LegErrors, c: Circumstances, home: Array, start: Pose
+) -> Pose:
+    """Poses at N instants from what the legs do, hidden errors included."""
+    fixed = lengths(g, c.extension) + errors.fixed(c)
+
+    def wanted(legs: Legs, pose: Pose) -> Array:
+        return fixed + errors.with_pose(c, legs, pose, home) if errors.depends_on_pose else fixed
+
+    return forward(g, wanted, start)[0]
+
+
+def _smrs(count: int) -> Smrs:
+    nests = {**dict.fromkeys(PLATFORM_NESTS, "platform"), **dict.fromkeys(BASE_NESTS, "base")}
+    if count == 1:
+        places = {"smr1": BIRDBATH}
+    elif count in (3, 7):
+        places = {f"smr{i + 1}": nest for i, nest in enumerate(list(nests)[:count])}
+    else:
+        raise ValueError(f"a station has 1, 3 or 7 SMRs, not {count}")
+    return Smrs(nests, {**places, "home": BIRDBATH})

@@ -50,9 +50,12 @@ class HexapodGeometry:
 
 @dataclass(frozen=True)
 class Legs:
-    """Legs at N poses: ``length`` (N, 6), and (N, 6, 3) in the base frame: ``u`` along the leg
-    from C to D, ``arm`` from the platform's origin to D, second axes ``second_base``, ``second_platform``,
-    and ``arm_axis`` R n_P."""
+    """Legs at N poses.
+
+    ``length`` (N, 6) mm; in the base frame, (N, 6, 3): ``u`` along the leg from C to D, ``arm``
+    from the platform's origin to D, ``second_base`` x_B x n_B, ``second_platform`` R (x_P x n_P),
+    ``arm_axis`` R n_P.
+    """
 
     length: Array
     u: Array
@@ -66,9 +69,10 @@ class Legs:
         return np.asarray(np.concatenate([self.u, np.cross(self.arm, self.u)], axis=2))
 
     def twist(self) -> Array:
-        """Angle from the base-side to the platform-side second axis about u, right-handed, (N, 6), rad."""
+        """Angle from base-side to platform-side second axis, right-handed about u, (N, 6), rad."""
         sine = np.sum(self.u * np.cross(self.second_base, self.second_platform), axis=2)
-        return np.arctan2(sine, np.sum(self.second_base * self.second_platform, axis=2))
+        cosine = np.sum(self.second_base * self.second_platform, axis=2)
+        return np.asarray(np.arctan2(sine, cosine))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,104 @@
+"""Where the tracker stands, where the nests are, and what distorts a point on its way."""
+
+import numpy as np
+
+from mocks.physics.hexapod import Array, rotation_from_rpy, rotation_from_vector
+from mocks.physics.hidden import Hidden
+
+BASE_NESTS: dict[str, tuple[float, float, float]] = {
+    "b1": (260.0, 0.0, -30.0),
+    "b2": (0.0, 260.0, -30.0),
+    "b3": (-260.0, 0.0, -30.0),
+    "b4": (0.0, -260.0, -30.0),
+}
+PLATFORM_NESTS: dict[str, tuple[float, float, float]] = {
+    "3": (0.0, 100.0, 0.0),
+    "4": (-86.602540, -50.0, 0.0),
+    "5": (86.602540, -50.0, 0.0),
+}
+HOME_REFLECTOR = (0.0, 180.0, -60.0)
+"""Birdbath, tracker frame, mm."""
+
+DEFAULT_DRIFT_DURATION_S = 3600.0
+
+
+class Station:
+    """The base frame in the tracker frame: p_tracker = R p_base + t, drawn by ``seed``.
+
+    The tracker stands 1.2 to 1.4 m away, looks down on the machine by 0.42 m, at any azimuth,
+    levelled to some milliradians.
+    """
+
+    def __init__(self, seed: int) -> None:
+        rng = np.random.default_rng([seed, 2])
+        azimuth = rng.uniform(-np.pi, np.pi)
+        distance = rng.uniform(1220.0, 1330.0)
+        height = rng.uniform(-450.0, -390.0)
+        self.translation = np.array(
+            [distance * np.cos(azimuth), distance * np.sin(azimuth), height]
+        )
+        rx, ry = rng.normal(0.0, 0.004, 2)
+        self.rotation = rotation_from_rpy(rx, ry, rng.uniform(-np.pi, np.pi))
+
+    def to_tracker(self, base: Array) -> Array:
+        """Points (N, 3) of the base frame in the tracker frame, mm."""
+        return np.asarray(base @ self.rotation.T + self.translation)
+
+
+class Distortions:
+    """What the tracker gets wrong, systematically, and what shifts between the frames."""
+
+    def __init__(self, hidden: Hidden) -> None:
+        self._scale = hidden.get("tracker-scale.k")
+        self._zero = hidden.get("tracker-offset.r0")
+        self._v = np.array([hidden.get(f"tracker-drift.v{a}") for a in "xyz"])
+        self._w = np.array([hidden.get(f"tracker-drift.w{a}") for a in "xyz"])
+        self._drift_s = hidden.get("tracker-drift.duration", DEFAULT_DRIFT_DURATION_S)
+        self._tide = hidden.get("unknown.tide.amplitude")
+        self._tide_s = hidden.get("unknown.tide.period", 240.0)
+        self._wobble = hidden.get("unknown.wobble.amplitude")
+        self._wobble_rad = np.radians(hidden.get("unknown.wobble.period", 7.0))
+        self._shift_time = hidden.get("frame-shift.t0", np.inf)
+        self._shift_base = _shift(hidden, "frame-shift.base") + _shift(hidden, "frame-shift")
+        self._shift_platform = _shift(hidden, "frame-shift.platform")
+        self._flex = hidden.get("unknown.platform-flex.k")
+        self._nests = {
+            nest: hidden.vector(f"nest-offset.{nest}") for nest in (*PLATFORM_NESTS, *BASE_NESTS)
+        }
+
+    def nest(self, name: str, centre: Array, times: Array, down: Array) -> Array:
+        """SMR centres (N, 3) in the frame that carries the nest, mm.
+
+        ``down`` (N, 3) is the direction of gravity in that frame.
+        """
+        points = centre + self._nests.get(name, np.zeros(3)) + np.zeros((times.size, 3))
+        if name in PLATFORM_NESTS:
+            points = points + self._flex * down * [1.0, 1.0, 0.0]
+            points = self._after(times, points, self._shift_platform)
+        return np.asarray(points)
+
+    def base(self, points: Array, times: Array) -> Array:
+        """Points (N, 3) of the base frame after the base has shifted, mm."""
+        return self._after(times, points, self._shift_base)
+
+    def _after(self, times: Array, points: Array, shift: Array) -> Array:
+        if not shift.any():
+            return points
+        moved = points @ rotation_from_vector(shift[None, 3:])[0].T + shift[:3]
+        return np.asarray(np.where((times >= self._shift_time)[:, None], moved, points))
+
+    def seen(self, points: Array, times: Array, drift_s: float | None = None) -> Array:
+        """What a noise-free tracker reads for points (N, 3) of its frame, mm."""
+        radius = np.linalg.norm(points, axis=1, keepdims=True)
+        seen = (1.0 + self._scale) * points + self._zero * points / radius
+        u = np.clip(times / (drift_s or self._drift_s), 0.0, 1.0)[:, None]
+        seen = seen + u * (self._v + np.cross(np.broadcast_to(self._w, points.shape), points))
+        heave = self._tide * np.sin(2.0 * np.pi * times / self._tide_s)
+        azimuth = np.arctan2(points[:, 1], points[:, 0])
+        heave = heave + self._wobble * np.sin(2.0 * np.pi * azimuth / self._wobble_rad)
+        seen[:, 2] += heave
+        return np.asarray(seen)
+
+
+def _shift(hidden: Hidden, stem: str) -> Array:
+    return hidden.vector(stem, "x y z rx ry rz")
