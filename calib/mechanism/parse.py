@@ -289,6 +289,12 @@ class _Reader:
         bound = spec.get(symbol)
         if isinstance(bound, str) and bound in names:
             symbol = bound
+        elif isinstance(bound, str) and bound.isidentifier():
+            raise self.fail(
+                f'"{bound}" is no actuator of this machine',
+                "limbs", limb, symbol,
+                remedy=f"Described are {', '.join(names)}.",
+            )  # fmt: skip
         elif bound is not None:
             return quantity(bound, unit, place)
         if symbol in names:

@@ -19,7 +19,7 @@ from calib.mechanism.householder import Reflectors, factorise
 from calib.mechanism.rigid import Poses, exponential, from_euler, product
 from calib.mechanism.task import task_error, task_rows, task_values
 
-CHUNK = 512
+CHUNK = 1024
 """Poses solved together: small enough that the working set stays in the cache."""
 MAX_ITERATIONS = 60
 MAX_STEP = 0.4
