@@ -9,6 +9,7 @@
     kind = "canopen"
     interface = "slcan"               # any python-can interface
     channel = "socket://127.0.0.1:40001"
+    node = 10                         # the controller's node; the drives are 1, 2, ...
     serial = "..."                    # optional; refused at connect if another one answers
 
     [tracker]
@@ -189,8 +190,8 @@ def _controller(table: TableReader) -> ControllerSite:
     settings: dict[str, Any] = {
         "interface": table.text("interface", "slcan"),
         "channel": table.text("channel"),
-        "bitrate": table.whole("bitrate", 1_000_000, least=10_000),
-        "controller_node": table.whole("controller_node", 0),
+        "bitrate": table.whole("bitrate", 0),
+        "controller_node": table.whole("node", 10, least=1),
     }
     table.end()
     return ControllerSite(kind, serial, settings)

@@ -240,22 +240,21 @@ class Journal:
         ).fetchone()
         return float(row["t"] or 0.0)
 
-    def invalidate(self, after_seq: int, why: str, time_s: float, utc: str) -> list[str]:
-        """Set good readings after a row aside, and let their steps be done again."""
+    def invalidate(self, why: str, time_s: float, utc: str) -> None:
+        """Set every good reading aside, and let all steps that rest on readings be done again."""
         with self._transaction():
-            found = self._db.execute(
-                "SELECT DISTINCT step, attempt FROM rows "
-                "WHERE seq > ? AND kind = 'reading' AND status = 'good'",
-                (after_seq,),
-            ).fetchall()
             self._db.execute(
                 "UPDATE rows SET status = 'invalidated', why = ? "
-                "WHERE seq > ? AND kind = 'reading' AND status = 'good'",
-                (why, after_seq),
+                "WHERE kind = 'reading' AND status = 'good'",
+                (why,),
             )
+            found = self._db.execute(
+                "SELECT s.id, l.attempt FROM steps s JOIN log l ON l.step = s.id "
+                "WHERE s.kind IN ('read', 'reference', 'drift') "
+                "AND l.seq IN (SELECT max(seq) FROM log GROUP BY step) AND l.state = 'done'"
+            ).fetchall()
             for row in found:
-                self._log(row["step"], "failed", row["attempt"], time_s, utc, {"what": why})
-        return [row["step"] for row in found]
+                self._log(row["id"], "failed", row["attempt"], time_s, utc, {"what": why})
 
     # notes
 

@@ -1,0 +1,83 @@
+"""Where the base stands in the tracker's frame: a rigid fit, and predictions with it.
+
+Points are (3,) or (3, N) arrays in mm. A frame as six numbers: x, y, z, rx, ry, rz with
+p_tracker = R p_base + t and R = Rz(rz) Ry(ry) Rx(rx).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.mechanism.rigid import Poses, to_euler
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A rigid motion p -> ``rotation`` p + ``translation``."""
+
+    rotation: Array
+    translation: Array
+
+    @staticmethod
+    def of(numbers: Sequence[float]) -> "Frame":
+        """Make a frame from x, y, z (mm), rx, ry, rz (rad)."""
+        poses = Poses.from_xyz_rpy(np.array(numbers, float)[:, None])
+        return Frame(poses.rotation[:, :, 0], poses.position[:, 0])
+
+    def numbers(self) -> tuple[float, ...]:
+        """Express the frame as x, y, z (mm), rx, ry, rz (rad)."""
+        return (*map(float, self.translation), *map(float, to_euler(self.rotation)))
+
+    def apply(self, points: Array) -> Array:
+        """Map points (3,) or (3, N)."""
+        moved: Array = self.rotation @ points
+        return moved + (self.translation if points.ndim == 1 else self.translation[:, None])
+
+    def after(self, first: "Frame") -> "Frame":
+        """Apply ``first``, then this one."""
+        return Frame(self.rotation @ first.rotation, self.apply(first.translation))
+
+    def inverse(self) -> "Frame":
+        """The motion back."""
+        back = self.rotation.T
+        return Frame(back, -back @ self.translation)
+
+
+def fit_frame(points: Array, seen: Array) -> tuple[Frame, float]:
+    """Fit seen = R points + t by least squares (Kabsch); both (3, N), N >= 3.
+
+    Returns the frame and the RMS distance that is left, mm.
+    """
+    centre, seen_centre = points.mean(axis=1), seen.mean(axis=1)
+    u, _, vt = np.linalg.svd((seen - seen_centre[:, None]) @ (points - centre[:, None]).T)
+    handed = np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
+    rotation = u @ handed @ vt
+    frame = Frame(rotation, seen_centre - rotation @ centre)
+    left = seen - frame.apply(points)
+    return frame, float(np.sqrt(np.mean(np.sum(left * left, axis=0))))
+
+
+def exchanged(
+    points: Mapping[str, Array], seen: Mapping[str, Array], rms_mm: float
+) -> dict[str, str]:
+    """Which labels were exchanged: the assignment that fits ``rms_mm``, where it is another one.
+
+    Returns seen label -> true label for those that differ; empty if none fits.
+    """
+    labels = list(seen)
+    best: tuple[float, tuple[str, ...]] = (rms_mm, tuple(labels))
+    for candidate in permutations(labels):
+        drawn = np.stack([points[label] for label in candidate], axis=1)
+        _, rms = fit_frame(drawn, np.stack([seen[label] for label in labels], axis=1))
+        best = min(best, (rms, candidate))
+    return {label: true for label, true in zip(labels, best[1], strict=True) if label != true}
+
+
+def nest_in_base(pose: Sequence[float], nest: Sequence[float]) -> Array:
+    """Place of a platform nest in the base frame, mm, at a pose x, y, z, rx, ry, rz."""
+    return Frame.of(pose).apply(np.array(nest, float))

@@ -1,0 +1,177 @@
+"""The beam: aim, settle, measure, and get it back when it was lost."""
+
+import asyncio
+from collections import deque
+from collections.abc import AsyncGenerator, AsyncIterator
+from contextlib import asynccontextmanager
+
+import numpy as np
+
+from app.errors import StoppedByOperator
+from app.session.events import LiveScatter
+from app.session.work import Work
+from drivers.errors import BeamBroken, DeviceError, MeasurementError, NoTarget, NotReady
+from drivers.interface import TrackerReading, TrackSample
+
+_SAMPLE_S = 0.05
+_RELOCK_TRIES = 4
+_RELOCK_WAIT_S = 0.5
+"""Wall seconds between tries to find the reflector again."""
+_TRIES = 4
+
+
+async def aim(work: Work, nest: str) -> None:
+    """Bring the beam to a nest, by its predicted place; raises NoTarget.
+
+    While one SMR is followed from pose to pose the beam is there already.
+    """
+    if work.memory.aimed_at == nest and nest in work.site.platform_nests:
+        return
+    x, y, z = work.predict(nest, work.memory.standing_at or "home")
+    work.memory.aimed_at = ""
+    await work.tracker.point_at((float(x), float(y), float(z)))
+    work.memory.aimed_at = nest
+
+
+async def settle(work: Work) -> None:
+    """Watch the SMR until it stands: scatter and creep of a window below their limits.
+
+    Once for each move: the machine does not move between two nests of one pose.
+    """
+    if work.memory.settled:
+        return
+    limits = work.limits
+    count = max(round(limits.settle_window_s / _SAMPLE_S), 6)
+    window: deque[tuple[float, float, float]] = deque(maxlen=count)
+    first: float | None = None
+    async with _closing(work.tracker.stream(_SAMPLE_S)) as samples:
+        async for sample in samples:
+            first = sample.time_s if first is None else first
+            if not sample.valid:
+                window.clear()
+                continue
+            window.append(sample.xyz)
+            if len(window) == count:
+                scatter, creep = _scatter(window)
+                settled = scatter < limits.settle_std_mm and creep < limits.settle_creep_mm
+                work.tell(LiveScatter(scatter, limits.settle_std_mm, sample.xyz, settled))
+                if settled:
+                    work.memory.settled = True
+                    return
+            if sample.time_s - first > limits.settle_timeout_s:
+                break
+    raise NotReady(
+        f"the machine does not come to rest within {limits.settle_timeout_s:g} s",
+        device="settling",
+        remedy="Look for vibration or air in the beam, or raise settle_std_mm in the site file",
+    )
+
+
+@asynccontextmanager
+async def _closing(
+    samples: AsyncIterator[TrackSample],
+) -> AsyncIterator[AsyncIterator[TrackSample]]:
+    """Let the tracker end its continuous mode before anything else is asked of it."""
+    try:
+        yield samples
+    finally:
+        if isinstance(samples, AsyncGenerator):
+            await samples.aclose()
+
+
+def _scatter(window: "deque[tuple[float, float, float]]") -> tuple[float, float]:
+    """Standard deviation (3D) and difference of the halves' means, mm."""
+    points = np.array(window)
+    half = len(points) // 2
+    creep = np.linalg.norm(points[half:].mean(axis=0) - points[:half].mean(axis=0))
+    return float(np.sqrt(points.var(axis=0, ddof=1).sum())), float(creep)
+
+
+async def measured(work: Work, nest: str, dwell_s: float) -> tuple[TrackerReading, float]:
+    """Measure, and when the beam is lost get it back and dwell again from the beginning.
+
+    Returns the reading and when its dwell began, machine s.
+
+    Raises
+    ------
+    MeasurementError
+        If the beam cannot be had again.
+    """
+    for attempt in range(1, _TRIES + 1):
+        try:
+            await settle(work)
+            begun = work.clock.now()
+            reading = await work.tracker.measure(dwell_s)
+            _check_finite(reading)
+            return reading, begun
+        except (BeamBroken, NoTarget) as lost:
+            if attempt == _TRIES:
+                raise
+            await recover(work, nest, lost)
+        except NotReady as unready:
+            if attempt == _TRIES:
+                raise
+            await _make_ready(work, nest, unready)
+    raise AssertionError("the loop returns or raises")
+
+
+def _check_finite(reading: TrackerReading) -> None:
+    """Refuse a reading that is no reading; raises MeasurementError."""
+    numbers = np.array([*reading.xyz, *reading.covariance])
+    if not np.all(np.isfinite(numbers)) or np.any(numbers[3:6] <= 0.0):
+        raise NotReady(
+            f"a reading with impossible numbers: {reading.xyz}, covariance {reading.covariance}",
+            device="tracker",
+            remedy="Initialise the tracker anew",
+        )
+
+
+async def recover(work: Work, nest: str, lost: DeviceError) -> None:
+    """Get the beam back: wait for it, point anew, search, ask. The machine holds still.
+
+    Unattended, the loss itself is raised when all of that fails.
+    """
+    work.losses += 1
+    work.memory.aimed_at = ""
+    work.memory.settled = False
+    work.suspended(
+        f"the beam is lost at nest {nest}: {lost.what}", "Clear the line of sight to the SMR"
+    )
+    while True:
+        for _ in range(_RELOCK_TRIES):
+            if await _relocked(work, nest):
+                work.released(f"the beam is on nest {nest} again")
+                return
+            await asyncio.sleep(_RELOCK_WAIT_S)
+        text = f"The beam does not come back to nest {nest}. Clear the line of sight or re-seat it."
+        if await work.ask(text, ("try again", "stop"), None, lost) == "stop":
+            raise StoppedByOperator(f"stopped while the beam was lost at nest {nest}")
+
+
+async def _relocked(work: Work, nest: str) -> bool:
+    """Point at the predicted place, then search around it."""
+    x, y, z = work.predict(nest, work.memory.standing_at or "home")
+    try:
+        await work.tracker.point_at((float(x), float(y), float(z)))
+    except (NoTarget, BeamBroken):
+        try:
+            await work.tracker.find_reflector(float(np.linalg.norm([x, y, z])))
+        except MeasurementError:
+            return False
+    work.memory.aimed_at = nest
+    return True
+
+
+async def _make_ready(work: Work, nest: str, unready: NotReady) -> None:
+    """Initialise a tracker that forgot, wait for one that is not warm or stable."""
+    work.suspended(f"the tracker is not ready: {unready.what}", unready.remedy or "Wait")
+    state = await work.tracker.state()
+    if not state.initialized:
+        await work.tracker.initialize()
+        if work.site.tracker.reflector:
+            await work.tracker.select_reflector(work.site.tracker.reflector)
+    else:
+        await asyncio.sleep(2.0 * _RELOCK_WAIT_S)
+    work.memory.aimed_at = ""
+    await aim(work, nest)
+    work.released("the tracker is ready again")

@@ -1,0 +1,112 @@
+"""SMRs and nests: who is where, and is it true?"""
+
+import numpy as np
+
+from app.session.frame import Array
+from app.session.journal import NewRow
+from app.session.plan import Step
+from app.session.routines.beam import aim, measured
+from app.session.routines.moving import ensure_at
+from app.session.work import HOME, Done, Work
+from drivers.errors import NoTarget
+
+_LOOK_S = 0.5
+"""Dwell of a look that only asks which nest it is, s."""
+TRIES = 3
+
+
+async def carry(work: Work, step: Step) -> Done:
+    """Have an SMR brought to a nest."""
+    await bring(work, step.args["smr"], step.args["nest"])
+    return Done(f"SMR {step.args['smr']} said to be in nest {step.args['nest']}")
+
+
+async def bring(work: Work, smr: int, nest: str) -> None:
+    """Have an SMR carried, and remember where it is believed to be."""
+
+    async def ask(text: str, choices: tuple[str, ...]) -> str:
+        return await work.ask(text, choices)
+
+    await work.station.carrier.carry(smr, nest, ask)
+    work.memory.smr_in[smr] = nest
+    work.journal.set_meta("smrs", {str(k): v for k, v in work.memory.smr_in.items()})
+    work.memory.aimed_at = ""
+
+
+async def ensure_smr(work: Work, nest: str) -> None:
+    """Let a nest be occupied, as far as we know; the reading itself proves it."""
+    if nest in work.site.base_nests and work.site.hands.base_smrs:
+        return
+    if nest not in work.memory.smr_in.values():
+        nests = list(work.site.platform_nests)
+        own = nests.index(nest) + 1 if nest in nests else 1
+        await bring(work, own if own <= work.site.hands.smrs else 1, nest)
+
+
+async def confirm(work: Work, step: Step) -> Done:
+    """Look whether the SMR is in the hole that it should be in; if not, have it carried again."""
+    nest = step.args["nest"]
+    for attempt in range(1, TRIES + 1):
+        await ensure_at(work, HOME)
+        await ensure_smr(work, nest)
+        wrong = await _look(work, nest)
+        if not wrong:
+            return Done(f"nest {nest} it is", {"attempts": attempt})
+        work.alarm(f"nest {nest}", wrong, f"Put the SMR into nest {nest}")
+        await again(work, nest, wrong)
+    raise wrong_hole(nest, wrong)
+
+
+def wrong_hole(nest: str, what: str) -> NoTarget:
+    """What is said when a nest stays wrong."""
+    return NoTarget(
+        f"nest {nest}: {what}, {TRIES} times",
+        device="tracker",
+        remedy=f"Put the SMR into nest {nest} and clear the line of sight, then go on",
+    )
+
+
+async def again(work: Work, nest: str, why: str) -> None:
+    """Have the SMR of a nest put right."""
+    if not work.unattended and work.site.hands.kind == "operator":
+        await work.ask(f"{why}. Put the SMR into nest {nest}.", ("done", "stop"))
+    smr = next((s for s, n in work.memory.smr_in.items() if n == nest), 1)
+    await bring(work, smr, nest)
+
+
+async def _look(work: Work, nest: str) -> str:
+    """Return what is wrong with the SMR in a nest, or nothing."""
+    try:
+        await aim(work, nest)
+        reading, _ = await measured(work, nest, _LOOK_S)
+    except NoTarget as nothing:
+        return f"no SMR is seen there ({nothing.what})"
+    return misplaced(work, nest, HOME, np.array(reading.xyz))
+
+
+def misplaced(work: Work, nest: str, label: str, xyz: Array) -> str:
+    """Judge a reading by where it is: empty if the nest is right, else what the tracker saw.
+
+    Every nest's place is predicted from the commanded pose; the radius is much larger than the
+    machine's errors and much smaller than the distance between nests.
+    """
+    allowed = work.limits.hole_radius_mm
+    if not work.memory.frame_found:
+        allowed += work.site.tracker.frame_radius_mm
+    nests = (*work.site.platform_nests, *work.site.base_nests)
+    distance = {name: float(np.linalg.norm(xyz - work.predict(name, label))) for name in nests}
+    nearest = min(distance, key=distance.__getitem__)
+    if distance[nest] <= allowed and nearest == nest:
+        return ""
+    if distance[nearest] <= allowed:
+        return f"the tracker sees nest {nearest} where nest {nest} was expected"
+    return f"the SMR is {distance[nest]:.2f} mm from nest {nest} and in no other nest"
+
+
+def rejected_row(
+    work: Work, label: str, nest: str, xyz: tuple[float, float, float], why: str
+) -> NewRow:
+    """A reading that is set aside: it stays in the journal and is not exported."""
+    return NewRow(
+        "reading", work.clock.now(), label, work.memory.q, nest, xyz, status="rejected", why=why
+    )

@@ -1,0 +1,89 @@
+"""Moves: absolute, so that a move in doubt is simply commanded again."""
+
+import asyncio
+
+from app.session.events import LivePose, PoseCommanded
+from app.session.journal import NewRow
+from app.session.plan import Step
+from app.session.work import HOME, Done, Work
+
+_SAME = 1e-6
+"""Actuator targets nearer than this (mm, rad) are the same."""
+_LIVE_S = 0.2
+
+
+async def home(work: Work, step: Step) -> Done:
+    """Go to the home pose."""
+    await ensure_at(work, HOME)
+    return Done("at home")
+
+
+async def move(work: Work, step: Step) -> Done:
+    """Go to a pose of the plan."""
+    await ensure_at(work, step.args["pose"])
+    return Done(f"at pose {step.args['pose']}", {"q": work.memory.q})
+
+
+async def ensure_at(work: Work, label: str) -> None:
+    """Let the machine stand at a pose: nothing to do where it does already."""
+    if work.memory.standing_at != label:
+        await go(work, label)
+
+
+async def go(work: Work, label: str) -> None:
+    """Command a pose, write down the controller's targets, and wait for the arrival.
+
+    The row is written as soon as the controller accepted: whatever happens then, the journal
+    knows where the machine was sent, which the direction of approach depends on.
+    """
+    memory = work.memory
+    memory.standing_at, memory.settled = None, False
+    pose = work.pose(label)
+    q = await work.controller.move_to_pose(pose)
+    memory.q = q
+    row = NewRow("move", work.clock.now(), label, q)
+    work.journal.add_row(work.step, work.attempt, work.clock.utc(), row)
+    work.tell(PoseCommanded(label, pose, q, row.time_s))
+    live = asyncio.create_task(_show_move(work), name="live pose")
+    try:
+        await work.controller.wait_arrived(_timeout(work))
+    finally:
+        live.cancel()
+        await asyncio.gather(live, return_exceptions=True)
+    memory.standing_at = label
+    memory.arrived_s = work.clock.now()
+    work.tell(LivePose(q, q, moving=False))
+
+
+def _timeout(work: Work) -> float:
+    """Wall seconds that a move may take."""
+    return work.clock.to_wall(work.limits.move_timeout_s) + 5.0
+
+
+async def _show_move(work: Work) -> None:
+    while True:
+        await asyncio.sleep(_LIVE_S)
+        state = await work.controller.state()
+        q = tuple(actuator.position for actuator in state.actuators)
+        target = tuple(actuator.target for actuator in state.actuators)
+        work.tell(LivePose(q, target, state.moving))
+
+
+async def take_stock(work: Work) -> None:
+    """Ask the controller where the machine was last sent; a row where the journal says otherwise.
+
+    After a kill the last command may not be in the journal, and between two sessions somebody may
+    have moved the machine by hand.
+    """
+    state = await work.controller.state()
+    q = tuple(actuator.target for actuator in state.actuators)
+    last = work.journal.last_row()
+    same = last is not None and all(abs(a - b) < _SAME for a, b in zip(q, last.q, strict=True))
+    work.memory.q = q
+    work.memory.standing_at = None
+    if last is not None and same and not state.moving and state.enabled:
+        work.memory.standing_at = last.pose or HOME
+        work.memory.arrived_s = last.time_s
+    elif not same:
+        row = NewRow("move", work.clock.now(), "", q)
+        work.journal.add_row(work.step, work.attempt, work.clock.utc(), row)

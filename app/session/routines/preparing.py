@@ -1,0 +1,134 @@
+"""Before the first move and after the last: who is there, what they hold, may we, are we warm."""
+
+import asyncio
+
+from app.session.known import compare_with_known
+from app.session.path import check_waypoints, waypoints
+from app.session.plan import Step
+from app.session.routines.moving import take_stock
+from app.session.work import Done, Work
+from drivers.errors import NotReady, Refused
+
+_LOOK_S = 10.0
+"""Machine seconds between two looks at the channels while warming up."""
+_PATIENCE = 30.0
+"""How many times the warm-up span the machine may take to become steady."""
+
+
+async def connect(work: Work, step: Step) -> Done:
+    """Compare what the controller holds with what the model expects; take stock of the machine.
+
+    Raises
+    ------
+    ParameterError
+        If values are missing, not finite, or not those that this program last left there.
+    """
+    await work.station.connect()
+    work.station.check()
+    held = await compare_with_known(work.site, work.controller)
+    work.memory.controller_parameters = dict(held.values)
+    first = work.journal.meta("controller_parameters")
+    if first is not None and first != held.values:
+        work.alarm(
+            "controller",
+            "its parameters are not those that this session began with",
+            "Undo to the earlier set, or measure anew",
+        )
+        raise Refused(
+            "the controller's parameters changed since this session began",
+            device="controller",
+            remedy="Bring them back with pkmcal undo, or measure anew",
+        )
+    identities = {
+        "controller": vars(work.controller.identity),
+        "tracker": vars(work.tracker.identity),
+    }
+    work.journal.set_meta("controller_parameters", held.values)
+    work.journal.set_meta("identities", identities)
+    await take_stock(work)
+    return Done(f"{len(held.values)} parameters as expected", {"checksum": held.checksum})
+
+
+async def check_path(work: Work, step: Step) -> Done:
+    """Check every pose and the way between them against all limits, before anything moves."""
+    path = waypoints(work.plan)
+    least = check_waypoints(
+        work.site.machine, work.memory.controller_parameters, [work.pose(p) for p in path], path
+    )
+    return Done(f"{len(path)} moves, {least:.1f} mm or more from every actuator limit")
+
+
+async def tracker(work: Work, step: Step) -> Done:
+    """Initialise the tracker and choose the reflector."""
+    await work.tracker.initialize()
+    wanted = work.site.tracker.reflector
+    if wanted:
+        await work.tracker.select_reflector(wanted)
+    state = await work.tracker.state()
+    if not state.initialized:
+        raise NotReady(
+            "not initialised although it was asked to be",
+            device="tracker",
+            remedy="Look at the tracker's own controller, then go on",
+        )
+    work.memory.aimed_at = ""
+    return Done(f"ready, reflector {state.reflector or 'as it was'}, face {state.face}")
+
+
+async def drives(work: Work, step: Step) -> Done:
+    """Power on, and every actuator that has lost its reference is homed."""
+    await work.controller.enable()
+    state = await work.controller.state()
+    homed = [actuator.name for actuator in state.actuators if not actuator.homed]
+    for name in homed:
+        await work.controller.home(name)
+    if homed:
+        work.memory.standing_at = None
+    return Done(f"drives on, {len(homed)} homed" if homed else "drives on")
+
+
+async def warm_up(work: Work, step: Step) -> Done:
+    """Wait for the laser, then watch the temperatures until they are steady."""
+    span, limit = work.limits.warm_up_s, work.limits.warm_up_K_per_min
+    begun = work.clock.now()
+    waited = False
+    while not (await work.tracker.state()).laser_warm:
+        if not waited:
+            work.suspended("the laser is not warm yet", "Wait; it takes minutes after power-on")
+        waited = True
+        _be_patient(work, begun, span, "the tracker's laser does not get warm")
+        await asyncio.sleep(work.clock.to_wall(_LOOK_S))
+    if waited:
+        work.released("the laser is warm")
+    seen = [(work.clock.now(), await channels(work))]
+    while seen[-1][0] - seen[0][0] < span or _slope(seen) > limit:
+        _be_patient(work, begun, span, f"temperatures change by more than {limit:g} K/min")
+        await asyncio.sleep(work.clock.to_wall(min(_LOOK_S, span / 4.0)))
+        seen.append((work.clock.now(), await channels(work)))
+        while len(seen) > 2 and seen[-1][0] - seen[1][0] >= span:
+            seen.pop(0)
+    return Done(f"steady: {_slope(seen):.2f} K/min", {"channels": seen[-1][1]})
+
+
+def _be_patient(work: Work, begun: float, span: float, why: str) -> None:
+    if work.clock.now() - begun > _PATIENCE * max(span, 60.0):
+        raise NotReady(why, device="warm-up", remedy="Find the cause, then go on")
+
+
+def _slope(seen: list[tuple[float, dict[str, float]]]) -> float:
+    """Fastest change of any temperature over the span, K/min."""
+    (t0, first), (t1, last) = seen[0], seen[-1]
+    changes = [abs(last[k] - first[k]) for k in last if k.endswith("temp_C") and k in first]
+    return max(changes, default=0.0) / max((t1 - t0) / 60.0, 1e-3)
+
+
+async def channels(work: Work) -> dict[str, float]:
+    """Everything that controller and tracker say about the state of things."""
+    tracker_says = await work.tracker.channels()
+    return {**tracker_says, **await work.controller.channels()}
+
+
+async def rest(work: Work, step: Step) -> Done:
+    """Take the power off the drives."""
+    await work.controller.disable()
+    return Done("drives off")

@@ -1,0 +1,368 @@
+"""A session: a plan, a journal and a station; started, paused, stopped, and gone on with.
+
+::
+
+    session = Session.create(site, plan, Path("sessions"))
+    leave = session.observers.watch(on_event)      # typed events, app/session/events.py
+    await session.connect()
+    outcome = await session.start()                # a task; or: await session.run()
+    session.pause(); session.resume(); session.skip("bad line of sight")
+    session.answer_prompt("prompt-1", "done")
+    await session.stop()                           # at any moment, also during a move
+    await session.close()
+
+    session = Session.reopen(folder)               # after a stop, a fault or kill -9
+"""
+
+import asyncio
+import contextlib
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from app.errors import GateRefused, StoppedByOperator
+from app.machine_files import read_text
+from app.session.events import (
+    Fault,
+    Finished,
+    Observers,
+    Paused,
+    Progress,
+    Resumed,
+    StepDone,
+    StepFailed,
+    StepSkipped,
+    StepStarted,
+    Stopped,
+)
+from app.session.export import export_run
+from app.session.journal import PENDING, Journal, StepState
+from app.session.plan import Plan, Step
+from app.session.recall import recall
+from app.session.routines import EVERY_TIME, NEVER_SKIPPED, ROUTINES
+from app.session.station import Station
+from app.session.work import Done, StartOver, Work
+from app.site import Site, parse_site
+from calib.errors import BadInput
+from drivers.errors import DeviceError
+from drivers.interface import Alarm
+
+_WATCH_S = 0.1
+_NOT_YET = StepState("planned", 0, {})
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a finished plan leaves: the folder of the exported run and how many readings."""
+
+    folder: Path
+    run_folder: Path
+    readings: int
+
+
+class Session:
+    """One plan on one station. See the module's head for its use.
+
+    ``unattended``: nobody answers prompts; their defaults do, and where a person is
+    indispensable the session ends with a fault that says so.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        plan: Plan,
+        station: Station,
+        journal: Journal,
+        *,
+        unattended: bool,
+    ) -> None:
+        self.folder = folder
+        self.plan = plan
+        self.station = station
+        self.journal = journal
+        self.work = Work(station, plan, journal, unattended=unattended)
+        self._states = journal.states()
+        self._again = {s.id for s in plan.steps if s.kind in EVERY_TIME and s.id in self._states}
+        self._going = asyncio.Event()
+        self._going.set()
+        self._driving: asyncio.Task[None] | None = None
+        self._step_task: asyncio.Task[Done] | None = None
+        self._skip_why: str | None = None
+        self._stopping = False
+
+    # making
+
+    @classmethod
+    def create(
+        cls,
+        site: Site,
+        plan: Plan,
+        root: Path = Path("sessions"),
+        *,
+        station: Station | None = None,
+        unattended: bool = False,
+    ) -> "Session":
+        """Begin a session in a new folder under ``root``: site, plan and journal are there."""
+        folder = _new_folder(root, f"{site.machine.name}-{plan.purpose}")
+        (folder / "site.toml").write_text(site.to_toml(), encoding="utf-8")
+        (folder / "plan.json").write_text(plan.to_json(), encoding="utf-8")
+        journal = Journal(folder / "journal.sqlite")
+        journal.enter_plan(plan)
+        journal.set_meta("begun_utc", datetime.now(UTC).isoformat(timespec="seconds"))
+        return cls(folder, plan, station or Station(site), journal, unattended=unattended)
+
+    @classmethod
+    def reopen(
+        cls, folder: Path, *, station: Station | None = None, unattended: bool = False
+    ) -> "Session":
+        """Go on with a session that ended early, however it ended.
+
+        Raises
+        ------
+        BadInput
+            If the folder holds no session.
+        """
+        for name in ("plan.json", "site.toml", "journal.sqlite"):
+            if not (folder / name).is_file():
+                raise BadInput(f"no {name} here", place=str(folder), remedy="Name a session folder")
+        plan = Plan.from_json(read_text(folder / "plan.json"), str(folder / "plan.json"))
+        site = parse_site(read_text(folder / "site.toml"), str(folder / "site.toml"), folder)
+        journal = Journal(folder / "journal.sqlite")
+        journal.enter_plan(plan)
+        return cls(folder, plan, station or Station(site), journal, unattended=unattended)
+
+    @property
+    def observers(self) -> Observers:
+        """Who is told; :meth:`Observers.watch` joins."""
+        return self.station.observers
+
+    def steps(self) -> Sequence[tuple[Step, StepState]]:
+        """Every step with its state, for a list on a screen."""
+        return [(step, self._states.get(step.id, _NOT_YET)) for step in self.plan.steps]
+
+    # the operator's keys
+
+    async def connect(self) -> None:
+        """Connect to the devices and own the machine; see :meth:`Station.connect`."""
+        await self.station.connect()
+
+    def start(self) -> "asyncio.Task[Outcome]":
+        """Run the plan in a task of its own."""
+        return asyncio.create_task(self.run(), name="session")
+
+    def pause(self) -> None:
+        """Hold when the step in work has ended; the beam is kept."""
+        if self._going.is_set():
+            self._going.clear()
+            self.work.note("paused", "by the operator")
+            self.observers.tell(Paused())
+
+    def resume(self) -> None:
+        """Go on after a pause."""
+        if not self._going.is_set():
+            self._going.set()
+            self.work.note("resumed", "by the operator")
+            self.observers.tell(Resumed())
+
+    @property
+    def paused(self) -> bool:
+        """Whether the operator paused."""
+        return not self._going.is_set()
+
+    def skip(self, why: str) -> None:
+        """Leave the step in work out; raises :class:`GateRefused` for one that safety needs."""
+        step = next((s for s in self.plan.steps if s.id == self.work.step), None)
+        if self._step_task is None or step is None:
+            raise GateRefused("no step is in work", remedy="Skip while a step runs")
+        if step.kind in NEVER_SKIPPED:
+            raise GateRefused(f"{step.says}: cannot be skipped", remedy="Stop instead")
+        self._skip_why = why
+        self._step_task.cancel()
+
+    async def stop(self) -> None:
+        """Stop everything now: motion first. :meth:`run` ends with StoppedByOperator."""
+        self._stopping = True
+        halted = asyncio.create_task(self.station.safe_stop())
+        if self._driving is not None:
+            self._driving.cancel()
+        await halted
+
+    def answer_prompt(self, prompt: str, choice: str) -> None:
+        """Answer a :class:`PromptNeeded` with one of its choices."""
+        self.work.answer(prompt, choice)
+
+    async def close(self) -> None:
+        """Let go of devices and journal."""
+        await self.station.close()
+        self.journal.close()
+
+    # the engine
+
+    async def run(self) -> Outcome:
+        """Do every step that is not done, in order; then export the run.
+
+        Raises
+        ------
+        StoppedByOperator
+            After :meth:`stop`.
+        DeviceError
+            On a fault; the machine was brought to a stop, and the session can be gone on with.
+        """
+        self.station.clock.start_at(self.journal.last_time())
+        recall(self.work)
+        leave = self.station.on_alarm(self._hear)
+        self._driving = asyncio.create_task(self._drive(), name="engine")
+        watch = asyncio.create_task(self._watch(), name="watch")
+        try:
+            done, _ = await asyncio.wait(
+                {self._driving, watch}, return_when=asyncio.FIRST_COMPLETED
+            )
+            fault = watch.exception() if watch in done else None
+            if isinstance(fault, DeviceError):
+                await self._end(self._driving)
+                raise fault
+            await self._driving
+        except asyncio.CancelledError:
+            await self._end(self._driving)
+            await self.station.safe_stop()
+            if not self._stopping:
+                raise
+            raise self._stopped() from None
+        except (DeviceError, GateRefused, BadInput) as fault:
+            safe = await self.station.safe_stop()
+            if self._stopping:
+                raise self._stopped() from fault
+            self.work.note("fault", str(fault))
+            remedy = f"{fault.remedy or 'Put it right'}; then: pkmcal resume {self.folder}"
+            self.observers.tell(Fault(fault.what, remedy, safe))
+            raise
+        except StoppedByOperator:
+            await self.station.safe_stop()
+            raise self._stopped() from None
+        except BaseException:
+            await self.station.safe_stop()
+            raise
+        finally:
+            await self._end(watch)
+            leave()
+            self._driving = None
+        return self._finish()
+
+    async def _drive(self) -> None:
+        begun = asyncio.get_running_loop().time()
+        at_start = self._done_count()
+        while (found := self._next()) is not None:
+            index, step = found
+            await self._going.wait()
+            await self._do(index, step)
+            done = self._done_count()
+            spent = asyncio.get_running_loop().time() - begun
+            rate = (done - at_start) / spent if spent > 0.0 else 0.0
+            left = (len(self.plan.steps) - done) / rate if rate > 0.0 else None
+            self.observers.tell(Progress(done, len(self.plan.steps), left))
+
+    def _next(self) -> tuple[int, Step] | None:
+        for index, step in enumerate(self.plan.steps):
+            state = self._states.get(step.id, _NOT_YET)
+            if state.state in PENDING or step.id in self._again:
+                return index, step
+        return None
+
+    def _done_count(self) -> int:
+        return sum(state.state not in PENDING for state in self._states.values())
+
+    async def _do(self, index: int, step: Step) -> None:
+        """Do one step: started, then done with its reading, failed, or skipped."""
+        attempt = self._states.get(step.id, _NOT_YET).attempt + 1
+        self.work.step, self.work.attempt = step.id, attempt
+        clock = self.station.clock
+        self.journal.started(step.id, attempt, clock.now(), clock.utc())
+        self._states[step.id] = StepState("started", attempt, {})
+        self.observers.tell(StepStarted(step.id, index, step.kind, step.says, attempt, clock.now()))
+        self._skip_why = None
+        self._step_task = asyncio.create_task(ROUTINES[step.kind](self.work, step))
+        try:
+            done = await self._step_task
+        except asyncio.CancelledError:
+            skipped = self._skip_asked()
+            if skipped is None:
+                self._failed(index, step, attempt, "stopped")
+                raise
+            self._skipped(index, step, attempt, skipped)
+            return
+        except DeviceError as error:
+            self._failed(index, step, attempt, str(error))
+            raise
+        except StartOver as moved:
+            self._failed(index, step, attempt, str(moved))
+            self._states = self.journal.states()
+            return
+        except (StoppedByOperator, GateRefused, BadInput) as error:
+            self._failed(index, step, attempt, str(error))
+            raise
+        finally:
+            self._step_task = None
+        self.journal.done(step.id, attempt, clock.now(), clock.utc(), done.result, done.reading)
+        self._states[step.id] = StepState("done", attempt, done.result)
+        self._again.discard(step.id)
+        self.observers.tell(StepDone(step.id, index, done.summary, clock.now()))
+
+    def _skip_asked(self) -> str | None:
+        """Why the step in work is to be left out; None if it is not."""
+        return None if self._stopping else self._skip_why
+
+    def _failed(self, index: int, step: Step, attempt: int, what: str) -> None:
+        clock = self.station.clock
+        self.journal.failed(step.id, attempt, clock.now(), clock.utc(), what)
+        self._states[step.id] = StepState("failed", attempt, {"what": what})
+        self.observers.tell(StepFailed(step.id, index, what, clock.now()))
+
+    def _skipped(self, index: int, step: Step, attempt: int, why: str) -> None:
+        clock = self.station.clock
+        self.journal.skipped(step.id, attempt, clock.now(), clock.utc(), why)
+        self._states[step.id] = StepState("skipped", attempt, {"why": why})
+        self._again.discard(step.id)
+        self.observers.tell(StepSkipped(step.id, index, why, clock.now()))
+
+    async def _watch(self) -> None:
+        """Look for standing faults (heartbeat, link, drive) while steps run."""
+        while True:
+            await asyncio.sleep(_WATCH_S)
+            self.station.check()
+
+    async def _end(self, task: "asyncio.Task[None]") -> None:
+        """Cancel a task and wait until it has ended; its own error is already known."""
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError, DeviceError):
+            await task
+
+    def _stopped(self) -> StoppedByOperator:
+        remedy = f"Go on with: pkmcal resume {self.folder}"
+        self.work.note("stopped", "by the operator")
+        self.observers.tell(Stopped(remedy))
+        return StoppedByOperator("stopped by the operator; the machine stands", remedy=remedy)
+
+    def _hear(self, alarm: Alarm) -> None:
+        self.work.note("alarm", f"{alarm.device}: {alarm.what}")
+
+    def _finish(self) -> Outcome:
+        run_folder = export_run(self.work.site, self.plan, self.journal, self.folder / "run")
+        readings = sum(row.kind == "reading" for row in self.journal.rows())
+        self.journal.set_meta("finished_utc", datetime.now(UTC).isoformat(timespec="seconds"))
+        self.observers.tell(Finished(str(run_folder), readings))
+        return Outcome(self.folder, run_folder, readings)
+
+
+def _new_folder(root: Path, name: str) -> Path:
+    """Make a new folder named by the time of day."""
+    stamp = datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
+    for suffix in ("", *(f"-{number}" for number in range(2, 100))):
+        folder = root / f"{stamp}-{name}{suffix}"
+        try:
+            os.makedirs(folder)  # noqa: PTH103 - fails if it exists, in one step
+        except FileExistsError:
+            continue
+        return folder
+    raise BadInput("a hundred sessions in one second", place=str(root))

@@ -1,0 +1,196 @@
+"""The devices of one site, connected: controller, tracker, and whoever carries SMRs."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from app.clock import Clock
+from app.session.events import (
+    AlarmRaised,
+    Connected,
+    DeviceStates,
+    Disconnected,
+    Observers,
+)
+from app.session.hands import Carrier, carrier_of
+from app.session.links import open_controller, open_tracker
+from app.session.ownership import Ownership
+from app.site import Site
+from drivers.errors import ConnectFailed, DeviceError
+from drivers.interface import Alarm, Identity, MotionController, Tracker
+
+STOP_DEADLINE_S = 3.0
+_State = TypeVar("_State")
+
+
+@dataclass(frozen=True)
+class Devices:
+    """Both links, open."""
+
+    controller: MotionController
+    tracker: Tracker
+
+
+class Station:
+    """Connects a site's devices, owns the machine meanwhile, and can bring it to a stop.
+
+    Observers of ``observers`` hear of connections, alarms and (from :meth:`poll`) states.
+    """
+
+    def __init__(self, site: Site, observers: Observers | None = None) -> None:
+        self.site = site
+        self.observers = observers or Observers()
+        self.clock = Clock(site.clock_scale)
+        self.carrier: Carrier = carrier_of(site)
+        self.owner = Ownership(_machine_key(site))
+        self._devices: Devices | None = None
+        self._alarm_hooks: list[Callable[[Alarm], None]] = []
+
+    @property
+    def connected(self) -> bool:
+        """Whether both devices are connected."""
+        return self._devices is not None
+
+    @property
+    def controller(self) -> MotionController:
+        """The motion controller; raises :class:`ConnectFailed` while not connected."""
+        return self._need().controller
+
+    @property
+    def tracker(self) -> Tracker:
+        """The tracker; raises :class:`ConnectFailed` while not connected."""
+        return self._need().tracker
+
+    def _need(self) -> Devices:
+        if self._devices is None:
+            raise ConnectFailed("the devices are not connected", remedy="Connect first")
+        return self._devices
+
+    async def connect(self) -> None:
+        """Take the machine and connect to both devices; compare identities with the site file.
+
+        Raises
+        ------
+        GateRefused
+            If another process owns the machine.
+        DeviceError
+            If a device does not answer, or is not the one that the site file names.
+        """
+        if self._devices is not None:
+            return
+        self.owner.take()
+        controller: MotionController | None = None
+        try:
+            controller = await open_controller(self.site)
+            self._check_identity("controller", controller.identity, self.site.controller.serial)
+            tracker = await open_tracker(self.site)
+            try:
+                self._check_identity("tracker", tracker.identity, self.site.tracker.serial)
+            except DeviceError:
+                await tracker.close()
+                raise
+        except BaseException:
+            if controller is not None:
+                await controller.close()
+            self.owner.release()
+            raise
+        self._devices = Devices(controller, tracker)
+        controller.on_alarm(self._alarm)
+        tracker.on_alarm(self._alarm)
+        addresses = {
+            "controller": str(self.site.controller.settings.get("channel", "")),
+            "tracker": f"{self.site.tracker.host}:{self.site.tracker.port}",
+        }
+        for role, identity in (
+            ("controller", controller.identity),
+            ("tracker", tracker.identity),
+        ):
+            self.observers.tell(Connected(role, identity, addresses[role]))
+
+    def _check_identity(self, role: str, identity: Identity, serial: str) -> None:
+        if serial and identity.serial != serial:
+            raise ConnectFailed(
+                f'serial number "{identity.serial}" answers where the site file expects "{serial}"',
+                device=role,
+                remedy=f"Check the address, or correct the serial of the {role} in "
+                f"{self.site.source}",
+            )
+
+    def on_alarm(self, hook: Callable[[Alarm], None]) -> Callable[[], None]:
+        """Call ``hook`` for each alarm as well (the journal does); returns how to leave."""
+        self._alarm_hooks.append(hook)
+        return lambda: self._alarm_hooks.remove(hook)
+
+    def _alarm(self, alarm: Alarm) -> None:
+        for hook in tuple(self._alarm_hooks):
+            hook(alarm)
+        self.observers.tell(AlarmRaised(alarm, self.clock.now()))
+
+    def check(self) -> None:
+        """Raise the fault that stands at either device, if any."""
+        devices = self._need()
+        devices.controller.check()
+        devices.tracker.check()
+
+    async def poll(self) -> DeviceStates:
+        """Ask both devices for their states, tell the observers, and return the answer.
+
+        For screens while no job runs. A device that does not answer is ``None``; why is told as
+        an alarm.
+        """
+        devices = self._need()
+        controller = await self._state_of("controller", devices.controller.state)
+        tracker = await self._state_of("tracker", devices.tracker.state)
+        states = DeviceStates(controller, tracker)
+        self.observers.tell(states)
+        return states
+
+    async def _state_of(self, role: str, ask: Callable[[], Awaitable[_State]]) -> _State | None:
+        try:
+            return await ask()
+        except DeviceError as error:
+            self._alarm(Alarm(role, error.what, error.remedy, fault=True))
+            return None
+
+    async def safe_stop(self) -> bool:
+        """Stop all motion and any measurement; never raises. Returns whether both confirmed."""
+        if self._devices is None:
+            return True
+        stops = (self._devices.controller.stop, self._devices.tracker.stop)
+        confirmed = await asyncio.gather(*(self._stopped(stop) for stop in stops))
+        return all(confirmed)
+
+    async def _stopped(self, stop: Callable[[], Awaitable[None]]) -> bool:
+        try:
+            async with asyncio.timeout(STOP_DEADLINE_S):
+                await stop()
+        except (DeviceError, TimeoutError, OSError) as error:
+            self._alarm(
+                Alarm(
+                    "stop",
+                    f"not confirmed: {error or 'no answer'}",
+                    "Use the emergency stop if anything still moves",
+                    fault=True,
+                )
+            )
+            return False
+        return True
+
+    async def close(self) -> None:
+        """Let go of both devices and of the machine."""
+        devices, self._devices = self._devices, None
+        if devices is not None:
+            for role, close in (
+                ("controller", devices.controller.close),
+                ("tracker", devices.tracker.close),
+            ):
+                await close()
+                self.observers.tell(Disconnected(role))
+        self.owner.release()
+
+
+def _machine_key(site: Site) -> str:
+    """What names the machine for the lock: its controller's address."""
+    settings = site.controller.settings
+    return f"{site.machine.name} at {settings.get('channel', site.controller.kind)}"
