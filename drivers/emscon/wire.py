@@ -234,7 +234,7 @@ def _frame(kind: int, body: bytes) -> bytes:
     return _HEADER.pack(HEADER_SIZE + len(body), kind) + body
 
 
-def request(name: str, **values: Value) -> bytes:
+def request(name: str, /, **values: Value) -> bytes:
     """A command as the program sends it."""
     command = COMMANDS[name]
     return _frame(
@@ -242,7 +242,7 @@ def request(name: str, **values: Value) -> bytes:
     )
 
 
-def answer(name: str, status: int = 0, **values: Value) -> bytes:
+def answer(name: str, status: int = 0, /, **values: Value) -> bytes:
     """A tracker's answer to a command; without values it is the fixed part alone."""
     command = COMMANDS[name]
     body = struct.pack("<ii", command.code, status)
@@ -264,7 +264,7 @@ def status_change(event: int) -> bytes:
     return _frame(PacketType.STATUS_CHANGE, struct.pack("<i", event))
 
 
-def data(kind: int, status: int = 0, **values: Value) -> bytes:
+def data(kind: int, status: int = 0, /, **values: Value) -> bytes:
     """A data packet of a fixed layout."""
     return _frame(kind, struct.pack("<i", status) + DATA[kind].pack(values))
 

@@ -1,0 +1,1 @@
+"""A mock laser tracker on TCP: emScon TPI subset, looking at the station's world."""
