@@ -65,7 +65,11 @@ def drive_objects() -> list[Object]:
         Entry("Speed during search for zero", "U32", rw, 2_000_000, "nm/s"),
     ]
     return [
-        *communication_objects("pkmcal mock drive", DRIVE_PRODUCT, 0x0002_0192, 4020),
+        *(
+            obj
+            for obj in communication_objects("pkmcal mock drive", DRIVE_PRODUCT, 0x0002_0192, 4020)
+            if obj.index not in (0x1010, 0x1011)
+        ),
         *(variable(index, entry) for index, entry in single),
         array(0x607D, "Software position limit", limits),
         array(0x6099, "Homing speeds", speeds),

@@ -1,0 +1,243 @@
+"""One CiA 402 drive: power state machine, homing, profile position, fault reset.
+
+Everything is read back and every wait has a deadline in wall seconds. ``canopen.BaseNode402`` is
+not used: its mode setter swallows errors, its homing returns False instead of raising, and it
+knows no set-point handshake.
+"""
+
+import asyncio
+import time
+from collections.abc import Callable
+
+import canopen
+
+from drivers.canopen.link import CanLink
+from drivers.errors import DriveFault, Refused, Silence
+
+CONTROLWORD, STATUSWORD, MODE, MODE_DISPLAY = 0x6040, 0x6041, 0x6060, 0x6061
+TARGET_POSITION, ERROR_CODE = 0x607A, 0x603F
+PROFILE_POSITION, HOMING, CYCLIC_POSITION = 1, 6, 8
+SHUTDOWN, SWITCH_ON, ENABLE, QUICK_STOP, DISABLE_VOLTAGE = 0x06, 0x07, 0x0F, 0x02, 0x00
+FAULT_RESET, NEW_SETPOINT, AT_ONCE = 0x80, 0x10, 0x20
+REACHED, LIMITED, ACKNOWLEDGED, FAILED = 1 << 10, 1 << 11, 1 << 12, 1 << 13
+REFERENCED = 1 << 15
+STATE_DEADLINE_S = 2.0
+POLL_S = 0.002
+
+STATES = (
+    (0x4F, 0x00, "not ready to switch on"),
+    (0x4F, 0x40, "switch on disabled"),
+    (0x6F, 0x21, "ready to switch on"),
+    (0x6F, 0x23, "switched on"),
+    (0x6F, 0x27, "operation enabled"),
+    (0x6F, 0x07, "quick stop active"),
+    (0x4F, 0x0F, "fault reaction active"),
+    (0x4F, 0x08, "fault"),
+)
+# What brings a drive one step nearer to operation enabled.
+NEXT_COMMAND = {
+    "switch on disabled": SHUTDOWN,
+    "ready to switch on": SWITCH_ON,
+    "switched on": ENABLE,
+    "quick stop active": DISABLE_VOLTAGE,
+}
+ERROR_WORDS = {
+    0x5000: "hardware error",
+    0x5530: "non-volatile memory damaged",
+    0x8130: "it no longer hears the PC",
+    0x8611: "following error: the leg does not follow its set-point",
+}
+
+
+def state_name(statusword: int) -> str:
+    """Return the name of the CiA 402 state in a statusword."""
+    for mask, bits, name in STATES:
+        if statusword & mask == bits:
+            return name
+    return f"unknown (statusword 0x{statusword:04X})"
+
+
+def error_words(code: int) -> str:
+    """Return an error code of 0x603F or EMCY in words."""
+    return f"{ERROR_WORDS.get(code, 'error')} (0x{code:04X})"
+
+
+def drive_fault(device: str, code: int) -> DriveFault:
+    """Return the exception for a drive that reports error ``code``."""
+    return DriveFault(
+        error_words(code),
+        device=device,
+        remedy="Remove the cause, clear the faults and enable the machine again.",
+    )
+
+
+class Drive402:
+    """The drive of one actuator.
+
+    Parameters
+    ----------
+    link : CanLink
+    node : canopen.RemoteNode
+    name : str
+        The actuator: ``q1``.
+    """
+
+    def __init__(self, link: CanLink, node: canopen.RemoteNode, name: str) -> None:
+        self.link = link
+        self.node = node
+        self.name = name
+        self.device = link.label(node.id)
+
+    async def read(self, index: int, sub: int = 0) -> int:
+        """Read an integer object."""
+        return await self.link.call(self.node.id, lambda: self._read(index, sub))
+
+    async def write(self, index: int, value: int, sub: int = 0) -> None:
+        """Write an integer object."""
+        await self.link.call(self.node.id, lambda: self._write(index, value, sub))
+
+    def _read(self, index: int, sub: int = 0) -> int:
+        variable = self.node.object_dictionary.get_variable(index, sub)
+        assert variable is not None, f"0x{index:04X} is not in the drive's EDS"
+        return int(variable.decode_raw(self.node.sdo.upload(index, sub)))
+
+    def _write(self, index: int, value: int, sub: int = 0) -> None:
+        variable = self.node.object_dictionary.get_variable(index, sub)
+        assert variable is not None, f"0x{index:04X} is not in the drive's EDS"
+        self.node.sdo.download(index, sub, variable.encode_raw(value))
+
+    # ------------------------------------------------------------ power
+
+    async def enable(self, mode: int = CYCLIC_POSITION) -> None:
+        """Set the mode and walk to operation enabled; raises DriveFault, Silence."""
+        await self.set_mode(mode)
+        deadline = time.monotonic() + STATE_DEADLINE_S
+        while True:
+            status = await self.read(STATUSWORD)
+            state = state_name(status)
+            if state == "operation enabled":
+                return
+            if state.startswith("fault"):
+                raise drive_fault(self.device, await self.read(ERROR_CODE))
+            if time.monotonic() > deadline:
+                raise Silence(
+                    f"remains in state {state!r}, wanted 'operation enabled'",
+                    device=self.device,
+                    remedy="Check the drive's enable input and its supply.",
+                )
+            if state in NEXT_COMMAND:
+                await self.write(CONTROLWORD, NEXT_COMMAND[state])
+            else:
+                await asyncio.sleep(POLL_S)
+
+    async def disable(self) -> None:
+        """Take the power off; a drive in fault has none already."""
+        await self.write(CONTROLWORD, DISABLE_VOLTAGE)
+        await self.wait(
+            lambda word: state_name(word) in ("switch on disabled", "fault"),
+            STATE_DEADLINE_S,
+            "take the power off",
+            faults=False,
+        )
+
+    async def clear_fault(self) -> None:
+        """Reset a fault (rising edge of bit 7); raises DriveFault if it stays."""
+        if state_name(await self.read(STATUSWORD)) != "fault":
+            return
+        await self.write(CONTROLWORD, DISABLE_VOLTAGE)
+        await self.write(CONTROLWORD, FAULT_RESET)
+        await self.write(CONTROLWORD, DISABLE_VOLTAGE)
+        if state_name(await self.read(STATUSWORD)) == "fault":
+            raise drive_fault(self.device, await self.read(ERROR_CODE))
+
+    async def set_mode(self, mode: int) -> None:
+        """Set the mode of operation and see it in 0x6061."""
+        await self.write(MODE, mode)
+        if await self.read(MODE_DISPLAY) != mode:
+            raise Refused(
+                f"does not take mode of operation {mode}",
+                device=self.device,
+                remedy="Check the supported modes (0x6502) of this drive.",
+            )
+
+    async def wait(
+        self, arrived: Callable[[int], bool], timeout: float, what: str, faults: bool = True
+    ) -> int:
+        """Poll the statusword until ``arrived``; raises DriveFault or Silence."""
+        deadline = time.monotonic() + timeout
+        while True:
+            status = await self.read(STATUSWORD)
+            if faults and state_name(status).startswith("fault"):
+                raise drive_fault(self.device, await self.read(ERROR_CODE))
+            if arrived(status):
+                return status
+            if time.monotonic() > deadline:
+                raise Silence(
+                    f"did not {what} within {timeout} s (state {state_name(status)!r})",
+                    device=self.device,
+                    remedy="Stop the machine and look at the actuator.",
+                )
+            await asyncio.sleep(POLL_S)
+
+    async def _need_enabled(self) -> None:
+        state = state_name(await self.read(STATUSWORD))
+        if state != "operation enabled":
+            raise Refused(
+                f"is in state {state!r}", device=self.device, remedy="Enable the machine first."
+            )
+
+    def _still_enabled(self, status: int) -> None:
+        state = state_name(status)
+        if state != "operation enabled":
+            raise Refused(
+                f"the motion was stopped (state {state!r})",
+                device=self.device,
+                remedy="Enable the machine and start again.",
+            )
+
+    # ------------------------------------------------------------ single motion
+
+    async def home(self, timeout: float) -> None:
+        """Run the homing procedure of 0x6098 and wait for its end."""
+        await self._need_enabled()
+        await self.set_mode(HOMING)
+
+        def attained(status: int) -> bool:
+            self._still_enabled(status)
+            if status & FAILED:
+                raise DriveFault(
+                    "homing failed", device=self.device, remedy="Look at its reference mark."
+                )
+            return bool(status & ACKNOWLEDGED and status & REACHED)
+
+        await self.write(CONTROLWORD, ENABLE | NEW_SETPOINT)
+        await self.wait(attained, timeout, "find its reference")
+        await self.write(CONTROLWORD, ENABLE)
+        await self.set_mode(CYCLIC_POSITION)
+
+    async def move_to(self, counts: int, timeout: float) -> None:
+        """Move alone to ``counts`` (profile position, set-point handshake) and wait."""
+        await self._need_enabled()
+        await self.set_mode(PROFILE_POSITION)
+        await self.write(TARGET_POSITION, counts)
+        await self.write(CONTROLWORD, ENABLE | NEW_SETPOINT | AT_ONCE)
+        await self.wait(
+            lambda word: bool(word & ACKNOWLEDGED), STATE_DEADLINE_S, "acknowledge its set-point"
+        )
+        await self.write(CONTROLWORD, ENABLE)
+        await self.wait(
+            lambda word: not word & ACKNOWLEDGED, STATE_DEADLINE_S, "end the set-point handshake"
+        )
+
+        def reached(status: int) -> bool:
+            self._still_enabled(status)
+            return bool(status & REACHED)
+
+        status = await self.wait(reached, timeout, "reach its target")
+        await self.set_mode(CYCLIC_POSITION)
+        if status & LIMITED:
+            raise Refused(
+                "the target is outside the drive's software limits (0x607D)",
+                device=self.device,
+                remedy="The actuator stands at its limit; command a position inside.",
+            )

@@ -1,0 +1,119 @@
+"""The CANopen side of a station: drives and controller on one bus behind an slcan adapter."""
+
+import threading
+from pathlib import Path
+
+from drivers.canopen.eds import eds_path
+from mocks.canopen.bus import EndpointBus, StationNetwork
+from mocks.canopen.controller import Controller
+from mocks.canopen.drive402 import Drive
+from mocks.canopen.ports import Machine
+from mocks.canopen.slcan import Frame, SlcanEndpoint
+
+CONTROLLER_NODE = 10
+LONGEST_PAUSE_S, SHORTEST_PAUSE_S = 0.02, 0.0005
+
+
+class CanopenStation:
+    """Seven nodes on a bus behind ``slcan`` on TCP.
+
+    Parameters
+    ----------
+    world : Machine
+        The machine that they move.
+    nvm_path : Path, optional
+        File with the controller's stored parameters; None keeps them in memory.
+    host, port
+        Where the adapter listens; see :attr:`address`.
+    serial : int
+        Serial number of the controller (0x1018:4).
+    machine : str
+        Which controller: its EDS is ``drivers/eds/<machine>_controller.eds``.
+    """
+
+    def __init__(
+        self,
+        world: Machine,
+        nvm_path: Path | None = None,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        serial: int = 1001,
+        machine: str = "hexapod",
+    ) -> None:
+        self._world = world
+        self._bus = EndpointBus(self._silent)
+        self.network = StationNetwork(self._bus)
+        drive_eds = eds_path("drive402")
+        self.drives = [Drive(n, drive_eds, world) for n in range(1, len(world.legs) + 1)]
+        controller_eds = eds_path(f"{machine}_controller")
+        self.controller = Controller(CONTROLLER_NODE, controller_eds, world, self.drives, nvm_path)
+        self.controller.object_dictionary[0x1018][4].default = serial
+        for drive in self.drives:
+            drive.object_dictionary[0x1018][4].default = serial * 10 + drive.id
+        self.endpoint = SlcanEndpoint(self._receive, host, port)
+        self._bus.endpoint = self.endpoint
+        self._wake = threading.Event()
+        self._stopping = False
+        self._thread = threading.Thread(target=self._run, name="canopen-station", daemon=True)
+
+    @property
+    def address(self) -> tuple[str, int]:
+        """Host and port of the adapter."""
+        return self.endpoint.address
+
+    def start(self) -> None:
+        """Power on: nodes boot, the adapter accepts clients."""
+        with self.network.lock:
+            for node in (*self.drives, self.controller):
+                node.attach(self.network)
+            self._power_on()
+        self._world.faults.subscribe(self._on_fault)
+        self._thread.start()
+        self.endpoint.start()
+
+    def stop(self) -> None:
+        """End all threads and connections."""
+        self._stopping = True
+        self._wake.set()
+        self._thread.join(2.0)
+        self.endpoint.stop()
+        for node in (*self.drives, self.controller):
+            node.nmt.stop_heartbeat()
+        self._bus.shutdown()
+
+    def power_cycle(self) -> None:
+        """Cut the power and bring it back: volatile memory is lost, the adapter stays."""
+        with self.network.lock:
+            self._power_on()
+
+    def cut(self, reset: bool = False) -> None:
+        """Cut every client off the adapter (``reset`` with a TCP RST)."""
+        self.endpoint.cut(reset)
+
+    def _power_on(self) -> None:
+        for drive in self.drives:
+            drive.power_on()
+        self.controller.power_on()
+
+    def _silent(self, node_id: int) -> bool:
+        return str(node_id) in self._world.faults.arguments("heartbeat-silent")
+
+    def _on_fault(self, _name: str, _present: bool) -> None:
+        self._wake.set()
+
+    def _receive(self, frame: Frame) -> None:
+        self.network.receive(frame)
+        if self.controller.wall_time_left < LONGEST_PAUSE_S:
+            self._wake.set()
+
+    def _run(self) -> None:
+        while not self._stopping:
+            with self.network.lock:
+                if self._world.faults.take("power-cycle"):
+                    self._power_on()
+                for drive in self.drives:
+                    drive.tick()
+                self.controller.tick()
+                left = self.controller.wall_time_left
+            self._wake.wait(min(max(left, SHORTEST_PAUSE_S), LONGEST_PAUSE_S))
+            self._wake.clear()
