@@ -1,0 +1,162 @@
+"""A session on the command line: progress and alarms on standard error, prompts answered there."""
+
+import asyncio
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from types import FrameType
+from typing import Any
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+from app.answer import interactive
+from app.session import events as ev
+from app.session.session import Outcome, Session
+
+
+class ConsoleFace:
+    """Watches a session's events and talks to the person at the terminal."""
+
+    def __init__(self, answer: Callable[[str, str], None], total: int, *, quiet: bool) -> None:
+        self._answer = answer
+        self._console = Console(stderr=True, quiet=quiet, highlight=False)
+        self._progress = Progress(
+            TextColumn("{task.completed:.0f}/{task.total:.0f}"),
+            BarColumn(bar_width=24),
+            TimeRemainingColumn(),
+            TextColumn("{task.description}"),
+            console=self._console,
+            transient=True,
+            disable=quiet or not self._console.is_terminal,
+        )
+        self._task: TaskID = self._progress.add_task("", total=total)
+        self._asking: set[asyncio.Task[None]] = set()
+
+    @contextmanager
+    def shown(self) -> Iterator[None]:
+        """Show the progress bar meanwhile."""
+        with self._progress:
+            yield
+
+    def hear(self, event: ev.Event) -> None:
+        """Take one event."""
+        match event:
+            case ev.StepStarted(says=says):
+                self._progress.update(self._task, description=says)
+            case ev.Progress(done=done, total=total):
+                self._progress.update(self._task, completed=done, total=total)
+            case ev.PromptNeeded():
+                asking = asyncio.create_task(self._ask(event))
+                self._asking.add(asking)
+                asking.add_done_callback(self._asking.discard)
+            case _:
+                words = _words(event)
+                if words:
+                    self._console.print(words, markup=False)
+
+    async def _ask(self, prompt: ev.PromptNeeded) -> None:
+        self._progress.stop()
+        text = f"{prompt.text} ({'/'.join(prompt.choices)})"
+        choice = click.Choice(prompt.choices)
+
+        def ask() -> str:
+            default = prompt.default
+            given: str = click.prompt(
+                text, type=choice, default=default, show_choices=False, err=True
+            )
+            return given
+
+        answer = await in_daemon_thread(ask)
+        self._progress.start()
+        self._answer(prompt.prompt, answer)
+
+
+async def in_daemon_thread(ask: Callable[[], str]) -> str:
+    """Wait for a person in a thread that does not keep the program alive when it is stopped."""
+    loop = asyncio.get_running_loop()
+    given: asyncio.Future[str] = loop.create_future()
+
+    def settle(answer: str) -> None:
+        if not given.done():
+            given.set_result(answer)
+
+    def wait() -> None:
+        try:
+            answer = ask()
+        except click.Abort:
+            signal.raise_signal(signal.SIGINT)
+            return
+        with suppress(RuntimeError):  # the loop has ended meanwhile: nobody wants the answer
+            loop.call_soon_threadsafe(settle, answer)
+
+    threading.Thread(target=wait, daemon=True, name="prompt").start()
+    return await given
+
+
+def _words(event: ev.Event) -> str:
+    """One line for what an operator wants to read; empty for the rest."""
+    match event:
+        case ev.Connected(role=role, identity=who, address=address):
+            return f"{role}: {who.product or who.kind} serial {who.serial or '?'} at {address}"
+        case ev.AlarmRaised(alarm=alarm):
+            return " ".join(f"! {alarm.device}: {alarm.what}. {alarm.remedy}".split())
+        case ev.Suspended(why=why, remedy=remedy):
+            return f"waiting: {why}. {remedy}"
+        case ev.Released(why=why):
+            return f"going on: {why}"
+        case ev.ReadingRejected(pose_label=pose, nest=nest, why=why):
+            return f"reading of nest {nest} at pose {pose or 'home'} set aside: {why}"
+        case ev.StepDone(summary=summary, step=step) if "-read-" not in step:
+            return f"  {step}: {summary}"
+        case ev.GateChecked(passed=passed, says=says):
+            return f"  {'passed ' if passed else 'REFUSED'} {says}"
+        case ev.WriteBackStage(stage=stage, says=says):
+            return f"  {stage}: {says}"
+        case ev.StepSkipped(step=step, why=why):
+            return f"  {step}: skipped, {why}"
+    return ""
+
+
+async def run_on_console(session: Session, *, quiet: bool) -> Outcome:
+    """Connect, run to the end, and let go; an interrupt (Ctrl-C, SIGTERM) stops the machine.
+
+    Raises what :meth:`Session.run` raises.
+    """
+    face = ConsoleFace(session.answer_prompt, len(session.plan.steps), quiet=quiet)
+    leave = session.observers.watch(face.hear)
+    try:
+        with face.shown(), stopping(session.stop):
+            await session.connect()
+            return await session.run()
+    finally:
+        leave()
+        await session.close()
+
+
+@contextmanager
+def stopping(stop: Callable[[], Any]) -> Iterator[None]:
+    """Let SIGINT and SIGTERM call the coroutine function ``stop`` in the running loop."""
+    loop = asyncio.get_running_loop()
+    under_way: set[asyncio.Future[Any]] = set()
+
+    def begin() -> None:
+        if not under_way:
+            under_way.add(asyncio.ensure_future(stop()))
+
+    def handle(signum: int, frame: FrameType | None) -> None:
+        loop.call_soon_threadsafe(begin)
+
+    before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def unattended(asked: bool) -> bool:
+    """Whether nobody can answer: asked for, or there is no terminal."""
+    return asked or not interactive()

@@ -1,0 +1,107 @@
+"""Measure poses with the tracker, and write a run"""
+
+import asyncio
+from pathlib import Path
+from typing import Any, cast
+
+import click
+
+from app import answer
+from app.console import run_on_console, unattended
+from app.poses_file import read_poses
+from app.session import Outcome, PlanOptions, Session, measure_plan
+from app.session.plans import Order
+from app.site import load_site
+
+
+def outcome_json(outcome: Outcome) -> dict[str, Any]:
+    """What a finished session answers."""
+    return {
+        "format": "pkm-session/1",
+        "session": str(outcome.folder),
+        "run": str(outcome.run_folder),
+        "readings": outcome.readings,
+    }
+
+
+@click.command()
+@click.option(
+    "--site",
+    "site_file",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="Site file: addresses, nests, who carries SMRs.",
+)
+@click.option(
+    "--poses",
+    "poses_file",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="Poses to visit (CSV; pkmcal poses chooses good ones).",
+)
+@click.option(
+    "--order",
+    type=click.Choice(["nest-by-nest", "pose-by-pose"]),
+    default=None,
+    help="One SMR carried from nest to nest, or SMRs in all nests.  [default: by SMRs at hand]",
+)
+@click.option(
+    "--reference-every",
+    default=30,
+    show_default=True,
+    type=click.IntRange(1),
+    help="Poses between two looks at the base nests.",
+)
+@click.option(
+    "--cycles",
+    default=1,
+    show_default=True,
+    type=click.IntRange(1),
+    help="How many times all poses are visited.",
+)
+@click.option("--no-warm-up", is_flag=True, help="Do not wait until temperatures are steady.")
+@click.option("--unattended", "alone", is_flag=True, help="Nobody answers questions.")
+@click.option(
+    "--folder",
+    default="sessions",
+    type=click.Path(path_type=Path),
+    help="Where the session's folder is made.",
+)
+@click.option("--title", default="", help="Title of the run.")
+@answer.json_option
+def command(
+    site_file: Path,
+    poses_file: Path,
+    order: str | None,
+    reference_every: int,
+    cycles: int,
+    no_warm_up: bool,
+    alone: bool,
+    folder: Path,
+    title: str,
+    as_json: bool,
+) -> None:
+    """Visit all poses with an SMR in each nest and write the readings as a run.
+
+    Everything is journaled as it happens: after a stop, a fault or a power cut, pkmcal resume
+    goes on where the session was. The whole path is checked against all limits before the first
+    move.
+    """
+    site = load_site(site_file)
+    poses = read_poses(poses_file)
+    enough = site.hands.smrs >= len(site.platform_nests)
+    chosen = order or ("pose-by-pose" if enough else "nest-by-nest")
+    options = PlanOptions(
+        order=cast(Order, chosen),
+        reference_every=reference_every,
+        cycles=cycles,
+        warm_up=not no_warm_up,
+        title=title,
+    )
+    plan = measure_plan(site, poses, options)
+    session = Session.create(site, plan, folder, unattended=unattended(alone))
+    answer.say(f"session {session.folder}")
+    outcome = asyncio.run(run_on_console(session, quiet=as_json))
+    answer.show(
+        outcome_json(outcome), as_json, f"{outcome.readings} readings in {outcome.run_folder}"
+    )
