@@ -28,6 +28,14 @@ from calib.mechanism.compiled import (
     element_value,
 )
 from calib.mechanism.description import Kind, Machine
+from calib.mechanism.elastic import (
+    RowWeights,
+    backward_substitution,
+    cholesky,
+    driven_rows,
+    forward_substitution,
+    unit_force,
+)
 from calib.mechanism.householder import Reflectors, factorise
 from calib.mechanism.rigid import cross, small_rotation
 
@@ -63,6 +71,12 @@ class Screw:
             np.divide(moment, size, out=out[:3])
             out[3:] = self.direction
 
+    def velocity(self, at: "Screw") -> Numbers:
+        """Velocity (3, L, N) of the points of the axis ``at`` per unit of this joint."""
+        if self.point is None or at.point is None:
+            return self.direction
+        return cross(self.direction, at.point - self.point)
+
 
 @dataclass(frozen=True, eq=False)
 class LinearLimbs:
@@ -77,6 +91,10 @@ class LinearLimbs:
     """r (6, L, N), scaled, from the limb's end to the platform, strains taken out."""
     residual: Numbers
     """W^T gap (rows, L, N)."""
+    triangle: Numbers | None
+    """Cholesky factor (rows, rows, L, N) of the flexibility; None for limbs that do not share."""
+    weights: RowWeights | None
+    """How the wrenches become rows of the closure; None where they are the rows."""
 
     @property
     def row_count(self) -> int:
@@ -191,7 +209,12 @@ class Closure:
             yielding = self._compliant_twists(group, screws)
             gap += np.einsum("icln,cln->iln", yielding, strain)
         W = factors.null_space()
-        return LinearLimbs(group, screws, factors, W, gap, np.einsum("irln,iln->rln", W, gap))
+        residual = np.einsum("irln,iln->rln", W, gap)
+        triangle, weights = None, None
+        if self.compiled.redundant:
+            triangle = cholesky(self._flexibility(group, screws, W))
+            weights = self._weights(group, screws, W, triangle)
+        return LinearLimbs(group, screws, factors, W, gap, residual, triangle, weights)
 
     def _compliant_twists(self, group: Group, screws: tuple[Screw | None, ...]) -> Numbers:
         columns: list[tuple[tuple[int, Array | None], ...]] = [
@@ -199,13 +222,45 @@ class Closure:
         ]
         return _twists(group, screws, columns, self.origin, self.machine.size, self.dtype)
 
-    def flexibility(self, limb: LinearLimbs) -> Numbers:
+    def _flexibility(self, group: Group, screws: tuple[Screw | None, ...], W: Numbers) -> Numbers:
         """G = W^T C W (rows, rows, L, N): how far the limb yields along its own wrenches."""
-        yielding = self._compliant_twists(limb.group, limb.screws)
-        along = np.einsum("icln,irln->crln", yielding, limb.wrenches)
-        c = limb.group.compliances
-        G: Numbers = np.einsum("crln,csln->rsln", c[:, None] * along, along)
+        yielding = self._compliant_twists(group, screws)
+        along = np.einsum("icln,irln->crln", yielding, W)
+        G: Numbers = np.einsum("crln,csln->rsln", group.compliances[:, None] * along, along)
         return G
+
+    def _weights(
+        self, group: Group, screws: tuple[Screw | None, ...], W: Numbers, triangle: Numbers
+    ) -> RowWeights:
+        def answers(elements: tuple[int, ...]) -> Numbers:
+            columns: list[tuple[tuple[int, Array | None], ...]] = [((k, None),) for k in elements]
+            moved = _twists(group, screws, columns, self.origin, self.machine.size, self.dtype)
+            found: Numbers = np.einsum("irln,icln->rcln", W, moved)
+            return found
+
+        if group.published_rows is not None:
+            published = []
+            for row in group.published_rows:
+                idle = None if row.idle is None else answers((row.idle,))
+                force = unit_force(W, idle, self.machine.size)
+                if row.spans is not None:
+                    force = force * self._area(screws, row.spans)
+                published.append(force)
+            return RowWeights(None, np.stack(published, axis=1))
+        if group.released and group.rows < group.wrenches:
+            driven = forward_substitution(triangle, answers(group.driven))
+            return RowWeights(triangle, driven_rows(driven))
+        return RowWeights(triangle, None)
+
+    def _area(self, screws: tuple[Screw | None, ...], spans: tuple[int, int, int]) -> Numbers:
+        """Area (L, N) that the velocities of two joints span at a third, over size squared."""
+        first, second, at = (screws[k] for k in spans)
+        assert first is not None
+        assert second is not None
+        assert at is not None
+        normal = cross(first.velocity(at), second.velocity(at)) / self.machine.size**2
+        area: Numbers = np.sqrt(np.einsum("iln,iln->ln", normal, normal))
+        return area
 
     def rows(self) -> tuple[Numbers, Numbers]:
         """Rows A (m, 6, N) and gaps b (m, N) with A dx = -b for a closed machine.
@@ -215,63 +270,29 @@ class Closure:
         """
         rows, gaps = [], []
         for limb in self.limbs:
-            W, b = limb.wrenches, limb.residual
-            if self.compiled.redundant:
-                W, b = self._whiten(limb)
-            m = W.shape[1] * W.shape[2]
-            rows.append(W.reshape(6, m, -1))
+            if not limb.row_count:
+                continue
+            W, b = limb.wrenches.swapaxes(0, 1), limb.residual
+            if limb.weights is not None:
+                W, b = limb.weights.apply(W), limb.weights.apply(b)
+            m = W.shape[0] * W.shape[2]
+            rows.append(W.swapaxes(1, 2).reshape(m, 6, -1))
             gaps.append(b.reshape(m, -1))
-        return np.concatenate(rows, axis=1).swapaxes(0, 1), np.concatenate(gaps)
-
-    def whitener(self, limb: LinearLimbs) -> Numbers:
-        """Lower triangle (rows, rows, L, N) of the Cholesky factor of the limb's flexibility."""
-        G = self.flexibility(limb)
-        L = np.zeros_like(G)
-        for i in range(G.shape[0]):
-            for j in range(i + 1):
-                rest = G[i, j] - sum(L[i, k] * L[j, k] for k in range(j))
-                L[i, j] = np.sqrt(rest) if i == j else rest / L[j, j]
-        return L
-
-    def _whiten(self, limb: LinearLimbs) -> tuple[Numbers, Numbers]:
-        L = self.whitener(limb)
-        W = np.array(limb.wrenches)
-        b = np.array(limb.residual)
-        for i in range(L.shape[0]):
-            for k in range(i):
-                W[:, i] -= L[i, k] * W[:, k]
-                b[i] -= L[i, k] * b[k]
-            W[:, i] /= L[i, i]
-            b[i] /= L[i, i]
-        return W, b
+        return np.concatenate(rows), np.concatenate(gaps)
 
     def strain(self, limb: LinearLimbs, twist: Numbers) -> tuple[Numbers, Numbers | None]:
         """Strains (n_compliant, L, N) of a limb pulled by ``twist`` (6, L, N), and their twist.
 
         A machine whose limbs are not redundant carries no wrench: nothing yields.
         """
-        if not self.compiled.redundant:
+        if limb.triangle is None:
             return np.zeros((0, *twist.shape[1:])), None
         along = np.einsum("irln,iln->rln", limb.wrenches, twist)
-        wrench = self._solve_flexibility(self.whitener(limb), along)
+        wrench = backward_substitution(limb.triangle, forward_substitution(limb.triangle, along))
         force = np.einsum("irln,rln->iln", limb.wrenches, wrench)
         yielding = self._compliant_twists(limb.group, limb.screws)
         strain = limb.group.compliances * np.einsum("icln,iln->cln", yielding, force)
         return strain, np.einsum("icln,cln->iln", yielding, strain)
-
-    @staticmethod
-    def _solve_flexibility(L: Numbers, b: Numbers) -> Numbers:
-        """(L L^T)^-1 b for L (rows, rows, L, N), b (rows, L, N)."""
-        x, m = np.array(b), L.shape[0]
-        for i in range(m):
-            for k in range(i):
-                x[i] -= L[i, k] * x[k]
-            x[i] /= L[i, i]
-        for i in range(m - 1, -1, -1):
-            for k in range(i + 1, m):
-                x[i] -= L[k, i] * x[k]
-            x[i] /= L[i, i]
-        return x
 
     def actuator_twist(self, limb: LinearLimbs, ds: Numbers) -> Numbers:
         """Scaled twist (6, L, N) of the limb's end for extension steps ds (n, N)."""
@@ -294,12 +315,13 @@ class Closure:
         """
         offset = 0
         for limb in self.limbs:
-            L = self.whitener(limb) if self.compiled.redundant else None
+            if not limb.row_count:
+                continue
             for element, screw in zip(limb.group.elements, limb.screws, strict=True):
                 for term in element.terms:
                     if term.kind != kind:
                         continue
-                    answer = self._answer(limb, screw, L)
+                    answer = self._answer(limb, screw)
                     if term.factor is not None:
                         answer = term.factor * answer
                     for i, variable in enumerate(term.index):
@@ -307,7 +329,7 @@ class Closure:
                         yield int(variable), rows, answer[:, i]
             offset += limb.row_count
 
-    def _answer(self, limb: LinearLimbs, screw: Screw | None, L: Numbers | None) -> Numbers:
+    def _answer(self, limb: LinearLimbs, screw: Screw | None) -> Numbers:
         assert screw is not None
         W, size = limb.wrenches, self.machine.size
         answer: Numbers
@@ -317,9 +339,4 @@ class Closure:
             moment = cross(screw.direction, self.origin - screw.point) / size
             answer = np.einsum("irln,iln->rln", W[:3], moment)
             answer += np.einsum("irln,iln->rln", W[3:], screw.direction)
-        if L is not None:
-            for i in range(L.shape[0]):
-                for k in range(i):
-                    answer[i] -= L[i, k] * answer[k]
-                answer[i] /= L[i, i]
-        return answer
+        return answer if limb.weights is None else limb.weights.apply(answer)

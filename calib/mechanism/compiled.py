@@ -6,7 +6,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from calib.arrays import Array, IntArray, Numbers
-from calib.mechanism.description import Element, Kind, Limb, Machine
+from calib.mechanism.description import Element, Kind, Limb, Machine, PublishedRow
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +45,27 @@ class Group:
     compliant: tuple[int, ...]
     unit: Array
     """What counts as a step of one: 1 rad, or the machine's size in mm; (n_passive, L, 1)."""
+    released: bool
+    published_rows: tuple[PublishedRow, ...] | None
+
+    @property
+    def wrenches(self) -> int:
+        """Wrenches that each limb can carry: 6 less its passive coordinates."""
+        return 6 - len(self.passive)
+
+    @cached_property
+    def driven(self) -> tuple[int, ...]:
+        """Elements that an actuator moves."""
+        return tuple(
+            k for k, e in enumerate(self.elements) if any(t.kind == "actuator" for t in e.terms)
+        )
 
     @property
     def rows(self) -> int:
-        """Constraint rows of each limb: 6 less its passive coordinates."""
-        return 6 - len(self.passive)
+        """Rows of the closure of each limb: its wrenches, less the constraint that it drops."""
+        if self.released:
+            return min(len(self.driven), self.wrenches)
+        return self.wrenches
 
     @cached_property
     def compliances(self) -> Array:
@@ -65,17 +81,17 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class Compiled:
-    """All groups, and how many constraint rows they hold together."""
+    """All groups, and how many wrenches they carry together."""
 
     groups: tuple[Group, ...]
-    rows: int
+    wrenches: int
     joint_count: int
     joint_start: Array
 
     @property
     def redundant(self) -> bool:
-        """Whether the closure is over-constrained (more rows than the pose has freedoms)."""
-        return self.rows > 6
+        """Whether the limbs are over-constrained (more wrenches than the pose has freedoms)."""
+        return self.wrenches > 6
 
     @property
     def elastic(self) -> bool:
@@ -86,6 +102,8 @@ class Compiled:
 def _signature(limb: Limb) -> object:
     return (
         len(limb.joints),
+        limb.released,
+        limb.published_rows,
         tuple(
             (e.turns, e.axis, e.compliance > 0.0, tuple(t.kind for t in e.terms))
             for e in limb.elements
@@ -129,6 +147,8 @@ def _group(machine: Machine, members: list[int]) -> Group:
         np.array(
             [[1.0 if machine.joints[j].turns else machine.size for j in row] for row in passive]
         ).reshape(count, len(members), 1),
+        limbs[0].released,
+        limbs[0].published_rows,
     )
 
 
@@ -141,7 +161,7 @@ def compile_machine(machine: Machine) -> Compiled:
     groups = tuple(_group(machine, indices) for indices in members.values())
     return Compiled(
         groups,
-        sum(group.rows * group.count for group in groups),
+        sum(group.wrenches * group.count for group in groups),
         len(machine.joints),
         np.array([joint.start for joint in machine.joints]),
     )

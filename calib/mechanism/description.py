@@ -85,6 +85,19 @@ class PassiveJoint:
 
 
 @dataclass(frozen=True)
+class PublishedRow:
+    """A row of the closure whose weight is nobody's compliance: a unit force of the limb.
+
+    It does no work on the element ``idle`` (None: the limb carries this wrench alone). With
+    ``spans`` = (i, j, k) it is scaled by the area that the velocities of the joints i and j span
+    at the axis of joint k, in units of the machine's size squared (Zhang et al. 2018, eq. 2).
+    """
+
+    idle: int | None
+    spans: tuple[int, int, int] | None
+
+
+@dataclass(frozen=True)
 class Limb:
     """A chain from the base frame to the platform frame."""
 
@@ -93,6 +106,11 @@ class Limb:
     joints: tuple[PassiveJoint, ...]
     first_joint: int
     """Index of this limb's first passive coordinate among those of the machine."""
+    released: bool = False
+    """Whether its constraint is dropped: only what its actuators hold reaches the platform."""
+    published_rows: tuple[PublishedRow, ...] | None = None
+    """Rows weighted as somebody published them; None for the weights that follow from the
+    compliances."""
 
 
 @dataclass(frozen=True)
