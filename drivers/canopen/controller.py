@@ -9,8 +9,9 @@ import math
 import struct
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 from drivers.canopen import layout as at
 from drivers.canopen.drive402 import (
@@ -24,7 +25,7 @@ from drivers.canopen.drive402 import (
 )
 from drivers.canopen.eds import eds_path
 from drivers.canopen.layout import Layout, read_layout
-from drivers.canopen.link import BusAddress, CanLink
+from drivers.canopen.link import BusAddress, CanLink, Device
 from drivers.canopen.motion import MOVE_TO_POSE, MOVE_TO_Q, PREPARE, STOP, MotionChannel
 from drivers.canopen.parameter_access import ParameterAccess
 from drivers.canopen.recognise import check_limits, check_serial, read_identity
@@ -38,6 +39,7 @@ from drivers.errors import (
 )
 from drivers.interface import ActuatorState, Alarm, ControllerState, Identity
 
+T = TypeVar("T")
 ANSWER_DEADLINE_S = 2.0
 SINGLE_MOTION_DEADLINE_S = 60.0
 
@@ -53,15 +55,16 @@ class CanopenController:
         self.identity = Identity("canopen-controller")
         self.layout = layout
         self._link = link
-        self._node = link.add_node(node_id, eds, f"controller (node {node_id})")
-        self._device = link.label(node_id)
+        self._controller = link.add_device(node_id, eds, f"controller (node {node_id})")
+        self._device = self._controller.label
         self._drives = []
         drive_eds = eds_path("drive402")
         for number, name in enumerate(layout.actuators, start=1):
-            node = link.add_node(number, drive_eds, f"drive {name} (node {number})")
-            self._drives.append(Drive402(link, node, name))
-        self._motion = MotionChannel(link, self._node, layout)
-        self._parameters = ParameterAccess(self._node, layout, self._device)
+            device = link.add_device(number, drive_eds, f"drive {name} (node {number})")
+            self._drives.append(Drive402(device, name))
+        self._devices = [self._controller, *(drive.remote for drive in self._drives)]
+        self._motion = MotionChannel(self._controller, layout)
+        self._parameters = ParameterAccess(self._controller, layout)
         self._callbacks: list[Callable[[Alarm], None]] = []
         self._stopped = False
         link.on_fault = self._on_fault
@@ -127,9 +130,7 @@ class CanopenController:
         self, serial: str | None, limits: Mapping[str, tuple[float, float]]
     ) -> None:
         try:
-            self.identity = await self._call(
-                lambda: read_identity(self._node, self.layout, self._device)
-            )
+            self.identity = await self._call(lambda: read_identity(self._controller, self.layout))
         except Silence as error:
             raise ConnectFailed(
                 f"the adapter answers, {self._device} does not",
@@ -137,7 +138,7 @@ class CanopenController:
                 remedy="Check that the controller is switched on, its node number and bit rate.",
             ) from error
         check_serial(self.identity, serial, self._device)
-        await self._call(lambda: check_limits(self._node, self.layout, limits, self._device))
+        await self._call(lambda: check_limits(self._controller, self.layout, limits))
 
     async def _watch_nodes(self) -> None:
         """Configure both heartbeats, set all nodes OPERATIONAL and hear each of them once."""
@@ -145,21 +146,20 @@ class CanopenController:
         producer = struct.pack("<H", round(address.heartbeat_s * 1000))
         consumer = struct.pack("<I", address.pc_node << 16 | round(address.silence_s * 1000))
 
-        def configure(node: Any) -> None:
-            node.sdo.download(0x1017, 0, producer)
-            node.sdo.download(0x1016, 1, consumer)
+        def configure(device: Device) -> None:
+            device.download(0x1017, 0, producer)
+            device.download(0x1016, 1, consumer)
 
-        nodes = [self._node, *(drive.node for drive in self._drives)]
         begin = time.monotonic()
         try:
-            for node in nodes:
-                await self._link.call(node.id, lambda node=node: configure(node))
+            for device in self._devices:
+                await device.call(partial(configure, device))
         except Silence as error:
             raise ConnectFailed(error.what, device=error.device, remedy=error.remedy) from error
         await self._link.operational()
-        while missing := [n.id for n in nodes if not self._link.heard_since(n.id, begin)]:
+        while missing := [d for d in self._devices if not self._link.heard_since(d.id, begin)]:
             if time.monotonic() - begin > address.silence_s + ANSWER_DEADLINE_S:
-                names = ", ".join(map(self._link.label, missing))
+                names = ", ".join(device.label for device in missing)
                 raise ConnectFailed(
                     f"no heartbeat from {names}",
                     device=self._link.name,
@@ -169,10 +169,10 @@ class CanopenController:
         await self._motion.synchronise()
         for drive in self._drives:
             if state_name(await drive.read(STATUSWORD)) == "fault":
-                self._latch_drive(drive.node.id, await drive.read(0x603F))
+                self._latch_drive(drive.remote.id, await drive.read(0x603F))
 
-    async def _call(self, action: Callable[[], Any]) -> Any:
-        return await self._link.call(self._node.id, action)
+    async def _call(self, action: Callable[[], T]) -> T:
+        return await self._controller.call(action)
 
     # ------------------------------------------------------------ what comes unasked
 
@@ -226,7 +226,7 @@ class CanopenController:
         return ControllerState(actuators, status.moving, status.enabled, await self.channels())
 
     def _fault_of(self, drive: Drive402) -> str:
-        fault = self._link.faults.get(f"drive {drive.node.id}")
+        fault = self._link.faults.get(f"drive {drive.remote.id}")
         return fault.what if fault is not None else ""
 
     async def channels(self) -> dict[str, float]:
@@ -234,10 +234,10 @@ class CanopenController:
         addresses = self.layout.channels
 
         def read() -> dict[str, float]:
-            data = {name: self._node.sdo.upload(*place) for name, place in addresses.items()}
+            data = {name: self._controller.upload(*place) for name, place in addresses.items()}
             return {name: struct.unpack("<d", raw)[0] for name, raw in data.items()}
 
-        return dict(await self._call(read))
+        return await self._call(read)
 
     # ------------------------------------------------------------ power
 
@@ -270,7 +270,7 @@ class CanopenController:
         await self._watch_nodes()
         for drive in self._drives:
             await drive.clear_fault()
-            self._link.unlatch(f"drive {drive.node.id}")
+            self._link.unlatch(f"drive {drive.remote.id}")
         self.check()
 
     # ------------------------------------------------------------ motion
@@ -289,9 +289,11 @@ class CanopenController:
         self.check()
         drive = self._drive(actuator)
         sub = self.layout.actuators.index(actuator) + 1
-        await self._call(lambda: self._node.sdo.download(at.COMMANDED_Q, sub, struct.pack("<d", q)))
+        await self._call(
+            lambda: self._controller.download(at.COMMANDED_Q, sub, struct.pack("<d", q))
+        )
         await self._motion.command(PREPARE + sub)
-        data = await self._call(lambda: self._node.sdo.upload(at.SETPOINTS, sub))
+        data = await self._call(lambda: self._controller.upload(at.SETPOINTS, sub))
         await drive.move_to(int.from_bytes(data, "little", signed=True), SINGLE_MOTION_DEADLINE_S)
 
     def _drive(self, actuator: str) -> Drive402:
@@ -322,7 +324,7 @@ class CanopenController:
 
         def write() -> None:
             for sub, value in enumerate(q, start=1):
-                self._node.sdo.download(at.COMMANDED_Q, sub, struct.pack("<d", value))
+                self._controller.download(at.COMMANDED_Q, sub, struct.pack("<d", value))
 
         await self._call(write)
         await self._motion.command(MOVE_TO_Q)
@@ -351,7 +353,7 @@ class CanopenController:
         if the machine does not come to rest.
         """
         quick = struct.pack("<H", QUICK_STOP)
-        frames = [(0x200 + drive.node.id, quick) for drive in self._drives]
+        frames = [(0x200 + drive.remote.id, quick) for drive in self._drives]
         again, self._stopped = self._stopped, True
         try:
             await self._link.send([self._motion.command_frame(STOP), *frames])
@@ -375,7 +377,7 @@ class CanopenController:
 
     async def read_parameters(self) -> dict[str, float]:
         """Read every kinematic and compensation parameter; raises ParameterError."""
-        return dict(await self._call(self._parameters.read))
+        return await self._call(self._parameters.read)
 
     async def write_parameters(self, values: Mapping[str, float]) -> None:
         """Write to volatile memory, read back bit for bit; motion must be disabled.
@@ -388,7 +390,7 @@ class CanopenController:
 
     async def parameter_checksum(self) -> int:
         """CRC-32 that the controller computes over the parameters that it uses now."""
-        return int(await self._call(self._parameters.checksum))
+        return await self._call(self._parameters.checksum)
 
     async def store_parameters(self) -> None:
         """Make the volatile parameters survive a power cycle; raises Refused."""
@@ -409,15 +411,12 @@ class CanopenController:
         if self._link.closed:
             return
         off = struct.pack("<H", DISABLE_VOLTAGE)
-        nodes = [self._node, *(drive.node for drive in self._drives)]
         try:
             if "link" not in self._link.faults:
-                frames = [(0x200 + drive.node.id, off) for drive in self._drives]
+                frames = [(0x200 + drive.remote.id, off) for drive in self._drives]
                 await self._link.send([self._motion.command_frame(STOP), *frames])
-                for node in nodes:
-                    await self._link.call(
-                        node.id, lambda node=node: node.sdo.download(0x1016, 1, bytes(4))
-                    )
+                for device in self._devices:
+                    await device.call(partial(device.download, 0x1016, 1, bytes(4)))
         except (DeviceError, DeviceFault) as error:
             self._alarm(Alarm(self._device, f"closed without a farewell: {error.what}"))
         await self._link.close()

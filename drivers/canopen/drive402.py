@@ -9,10 +9,10 @@ import asyncio
 import time
 from collections.abc import Callable
 
-import canopen
+from canopen.objectdictionary import ODVariable
 
-from drivers.canopen.link import CanLink
-from drivers.errors import DriveFault, Refused, Silence
+from drivers.canopen.link import Device
+from drivers.errors import DriveFault, ProtocolError, Refused, Silence
 
 CONTROLWORD, STATUSWORD, MODE, MODE_DISPLAY = 0x6040, 0x6041, 0x6060, 0x6061
 TARGET_POSITION, ERROR_CODE = 0x607A, 0x603F
@@ -76,35 +76,39 @@ class Drive402:
 
     Parameters
     ----------
-    link : CanLink
-    node : canopen.RemoteNode
+    device : Device
     name : str
         The actuator: ``q1``.
     """
 
-    def __init__(self, link: CanLink, node: canopen.RemoteNode, name: str) -> None:
-        self.link = link
-        self.node = node
+    def __init__(self, device: Device, name: str) -> None:
+        self.remote = device
         self.name = name
-        self.device = link.label(node.id)
+        self.device = device.label
 
     async def read(self, index: int, sub: int = 0) -> int:
         """Read an integer object."""
-        return await self.link.call(self.node.id, lambda: self._read(index, sub))
+        return await self.remote.call(lambda: self._read(index, sub))
 
     async def write(self, index: int, value: int, sub: int = 0) -> None:
         """Write an integer object."""
-        await self.link.call(self.node.id, lambda: self._write(index, value, sub))
+        await self.remote.call(lambda: self._write(index, value, sub))
 
     def _read(self, index: int, sub: int = 0) -> int:
-        variable = self.node.object_dictionary.get_variable(index, sub)
-        assert variable is not None, f"0x{index:04X} is not in the drive's EDS"
-        return int(variable.decode_raw(self.node.sdo.upload(index, sub)))
+        return int(self._variable(index, sub).decode_raw(self.remote.upload(index, sub)))
 
     def _write(self, index: int, value: int, sub: int = 0) -> None:
-        variable = self.node.object_dictionary.get_variable(index, sub)
-        assert variable is not None, f"0x{index:04X} is not in the drive's EDS"
-        self.node.sdo.download(index, sub, variable.encode_raw(value))
+        self.remote.download(index, sub, self._variable(index, sub).encode_raw(value))
+
+    def _variable(self, index: int, sub: int) -> ODVariable:
+        variable = self.remote.node.object_dictionary.get_variable(index, sub)
+        if variable is None:
+            raise ProtocolError(
+                f"its EDS file has no object 0x{index:04X}:{sub}",
+                device=self.device,
+                remedy="Use the EDS file of this drive.",
+            )
+        return variable
 
     # ------------------------------------------------------------ power
 

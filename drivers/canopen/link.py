@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 import can
 import canopen
 from canopen.emcy import EmcyError
-from canopen.sdo import SdoAbortedError, SdoCommunicationError
+from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from drivers.canopen.sdo_abort import REMEDIES, abort_words
 from drivers.errors import (
@@ -67,6 +67,28 @@ class BusAddress:
             if self.channel.startswith("socket://"):
                 options["sleep_after_open"] = 0
         return options
+
+
+class Device:
+    """A remote node on a link, with blocking access (for :meth:`call`) and the way to it."""
+
+    def __init__(self, link: "CanLink", node_id: int, label: str, node: canopen.RemoteNode) -> None:
+        self.link = link
+        self.id = node_id
+        self.label = label
+        self.node = node
+
+    async def call(self, action: Callable[[], T]) -> T:
+        """Run blocking ``action`` in a worker thread; raises as :meth:`CanLink.call`."""
+        return await self.link.call(self.id, action)
+
+    def upload(self, index: int, sub: int = 0) -> bytes:
+        """Read an object; blocking."""
+        return bytes(self.node.sdo.upload(index, sub))
+
+    def download(self, index: int, sub: int, data: bytes) -> None:
+        """Write an object; blocking."""
+        self.node.sdo.download(index, sub, data)
 
 
 class CanLink:
@@ -117,7 +139,7 @@ class CanLink:
         if isinstance(connection, socket.socket):
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
-    def add_node(self, node_id: int, eds: Path, label: str) -> canopen.RemoteNode:
+    def add_device(self, node_id: int, eds: Path, label: str) -> "Device":
         """Add a remote node; ``label`` is what errors call it."""
         node = self._network.add_node(node_id, str(eds))
         node.sdo.RESPONSE_TIMEOUT = SDO_DEADLINE_S
@@ -127,7 +149,7 @@ class CanLink:
         self._labels[node_id] = label
         node.nmt.add_heartbeat_callback(lambda _state: self._hear(node_id))
         node.emcy.add_callback(lambda emcy: self._hear_emergency(node_id, emcy))
-        return node
+        return Device(self, node_id, label, node)
 
     def label(self, node_id: int) -> str:
         """Return what a node is called."""

@@ -12,11 +12,9 @@ import struct
 import time
 from collections.abc import Callable, Sequence
 
-import canopen
-
 from drivers.canopen import layout as at
 from drivers.canopen.layout import Layout
-from drivers.canopen.link import CanLink
+from drivers.canopen.link import Device
 from drivers.canopen.motion_status import INTERRUPTED, MotionStatus
 from drivers.errors import DeviceFault, Silence
 
@@ -28,18 +26,18 @@ MOVE_TO_POSE, MOVE_TO_Q, STOP, PREPARE = 1, 2, 3, 0x10
 class MotionChannel:
     """The motion objects of one controller node."""
 
-    def __init__(self, link: CanLink, node: canopen.RemoteNode, layout: Layout) -> None:
+    def __init__(self, controller: Device, layout: Layout) -> None:
         self.status = MotionStatus(0, 0, 0, 0)
-        self._link = link
-        self._node = node
+        self._controller = controller
+        self._link = link = controller.link
         self._layout = layout
-        self._device = link.label(node.id)
+        self._device = controller.label
         self._targets = [math.nan] * len(layout.actuators)
         self._sequence = 0
         self._lock = asyncio.Lock()
         self._waiters: list[asyncio.Future[None]] = []
-        self._command_id, *self._pose_ids = [pdo.cob_id for pdo in node.rpdo.values()]
-        status, *targets = list(node.tpdo.values())
+        self._command_id, *self._pose_ids = [pdo.cob_id for pdo in controller.node.rpdo.values()]
+        status, *targets = list(controller.node.tpdo.values())
         status.add_callback(
             lambda pdo: link.in_loop(self._on_status, MotionStatus.from_bytes(bytes(pdo.data)))
         )
@@ -87,10 +85,10 @@ class MotionChannel:
         """Read the status by SDO."""
 
         def read() -> MotionStatus:
-            parts = [self._node.sdo.upload(at.STATUS, sub) for sub in (1, 2, 3, 4)]
+            parts = [self._controller.upload(at.STATUS, sub) for sub in (1, 2, 3, 4)]
             return MotionStatus.from_bytes(b"".join(parts))
 
-        self.status = await self._link.call(self._node.id, read)
+        self.status = await self._controller.call(read)
         return self.status
 
     async def synchronise(self) -> None:
@@ -134,10 +132,10 @@ class MotionChannel:
         subs = range(1, len(self._layout.actuators) + 1)
 
         def read() -> list[float]:
-            data = b"".join(self._node.sdo.upload(index, sub) for sub in subs)
+            data = b"".join(self._controller.upload(index, sub) for sub in subs)
             return list(struct.unpack(f"<{len(subs)}d", data))
 
-        return await self._link.call(self._node.id, read)
+        return await self._controller.call(read)
 
     async def wait_arrived(self, timeout: float) -> None:
         """Wait for the end of the motion at its target; raises DeviceFault, Silence."""

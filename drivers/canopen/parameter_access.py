@@ -5,11 +5,11 @@ import struct
 import zlib
 from collections.abc import Mapping
 
-import canopen
-from canopen.sdo import SdoAbortedError
+from canopen.sdo.exceptions import SdoAbortedError
 
 from drivers.canopen import layout as at
 from drivers.canopen.layout import Address, Layout
+from drivers.canopen.link import Device
 from drivers.canopen.sdo_abort import REMEDIES, abort_words
 from drivers.errors import ParameterError, Refused
 
@@ -20,10 +20,10 @@ REMEDY_MISMATCH = "Do not move the machine. Check the EDS file and the controlle
 class ParameterAccess:
     """The parameters of one controller node."""
 
-    def __init__(self, node: canopen.RemoteNode, layout: Layout, device: str) -> None:
-        self._node = node
+    def __init__(self, controller: Device, layout: Layout) -> None:
+        self._controller = controller
         self._layout = layout
-        self._device = device
+        self._device = controller.label
 
     def read(self) -> dict[str, float]:
         """Read all parameters as two blocks, each with the CRC-32 over all of them.
@@ -49,7 +49,7 @@ class ParameterAccess:
     def _block(
         self, index: int, addresses: Mapping[str, Address], what: str
     ) -> tuple[dict[str, float], int]:
-        data = self._node.sdo.upload(index, 0)
+        data = self._controller.upload(index, 0)
         count = (len(data) - 4) // 8
         if count != len(addresses) or len(data) % 8 != 4:
             raise self._error(f"answers {count} of {len(addresses)} {what} parameters")
@@ -87,7 +87,7 @@ class ParameterAccess:
     def _write_one(self, name: str, value: float) -> None:
         index, sub = self._layout.parameters[name]
         try:
-            self._node.sdo.download(index, sub, struct.pack("<d", value))
+            self._controller.download(index, sub, struct.pack("<d", value))
         except SdoAbortedError as error:
             raise Refused(
                 f"refuses {name} = {value!r}: {abort_words(error.code)}",
@@ -98,14 +98,15 @@ class ParameterAccess:
 
     def checksum(self) -> int:
         """Read the controller's CRC-32 of the active parameters."""
-        data = self._node.sdo.upload(at.CHECKSUM, 1)
+        data = self._controller.upload(at.CHECKSUM, 1)
         return int.from_bytes(data, "little")
 
     def command(self, index: int, signature: bytes) -> None:
         """Write a signature to 0x1010, 0x1011 or 0x2501; storing may take seconds."""
-        usual = self._node.sdo.RESPONSE_TIMEOUT
-        self._node.sdo.RESPONSE_TIMEOUT = STORE_DEADLINE_S
+        client = self._controller.node.sdo
+        usual = client.RESPONSE_TIMEOUT
+        client.RESPONSE_TIMEOUT = STORE_DEADLINE_S
         try:
-            self._node.sdo.download(index, 1, signature)
+            self._controller.download(index, 1, signature)
         finally:
-            self._node.sdo.RESPONSE_TIMEOUT = usual
+            client.RESPONSE_TIMEOUT = usual

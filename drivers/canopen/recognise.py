@@ -3,10 +3,9 @@
 import struct
 from collections.abc import Mapping
 
-import canopen
-
 from drivers.canopen import layout as at
 from drivers.canopen.layout import Layout
+from drivers.canopen.link import Device
 from drivers.errors import Refused
 from drivers.interface import Identity
 
@@ -15,25 +14,27 @@ def _text(data: bytes) -> str:
     return data.decode("ascii", "replace").rstrip("\0")
 
 
-def read_identity(node: canopen.RemoteNode, layout: Layout, device: str) -> Identity:
+def read_identity(controller: Device, layout: Layout) -> Identity:
     """Read 0x1018 and the machine's name; raises Refused if it is another device."""
     vendor, product, _, serial = (
-        int.from_bytes(node.sdo.upload(at.IDENTITY, sub), "little") for sub in (1, 2, 3, 4)
+        int.from_bytes(controller.upload(at.IDENTITY, sub), "little") for sub in (1, 2, 3, 4)
     )
     wrong = f"is product 0x{product:X}, expected 0x{layout.product_code:X}"
     if product == layout.product_code:
-        machine = _text(node.sdo.upload(at.MACHINE, 1))
+        machine = _text(controller.upload(at.MACHINE, 1))
         if machine == layout.machine:
             return Identity(
                 kind="canopen-controller",
                 vendor=f"0x{vendor:08X}",
-                product=_text(node.sdo.upload(0x1008, 0)),
+                product=_text(controller.upload(0x1008, 0)),
                 serial=str(serial),
-                firmware=_text(node.sdo.upload(0x100A, 0)),
+                firmware=_text(controller.upload(0x100A, 0)),
             )
         wrong = f"controls a machine {machine!r}, expected {layout.machine!r}"
     raise Refused(
-        wrong, device=device, remedy="Check node number, machine and EDS file in the site file."
+        wrong,
+        device=controller.label,
+        remedy="Check node number, machine and EDS file in the site file.",
     )
 
 
@@ -48,17 +49,14 @@ def check_serial(identity: Identity, serial: str | None, device: str) -> None:
 
 
 def check_limits(
-    node: canopen.RemoteNode,
-    layout: Layout,
-    limits: Mapping[str, tuple[float, float]],
-    device: str,
+    controller: Device, layout: Layout, limits: Mapping[str, tuple[float, float]]
 ) -> None:
     """Refuse a controller that would let an actuator go further than ``limits`` allow."""
     for sub, name in enumerate(layout.actuators, start=1):
         if name not in limits:
             continue
         low, high = (
-            struct.unpack("<d", node.sdo.upload(index, sub))[0]
+            struct.unpack("<d", controller.upload(index, sub))[0]
             for index in (at.LOWER_Q, at.UPPER_Q)
         )
         allowed_low, allowed_high = limits[name]
@@ -66,6 +64,6 @@ def check_limits(
             raise Refused(
                 f"lets {name} go from {low:g} to {high:g}, the machine file only from "
                 f"{allowed_low:g} to {allowed_high:g}",
-                device=device,
+                device=controller.label,
                 remedy="Set the controller's limits, or correct the machine file.",
             )

@@ -8,9 +8,10 @@ the machine does next.
 import math
 from collections.abc import Sequence
 from enum import IntEnum
+from functools import partial
 from pathlib import Path
 
-from canopen.sdo import SdoAbortedError
+from canopen.sdo.exceptions import SdoAbortedError
 
 from mocks.canopen.compensation import Compensation, direction_of
 from mocks.canopen.drive402 import COUNTS_PER_MM, PEAK_SPEED, Drive
@@ -101,9 +102,9 @@ class Controller(StationNode):
             (0x2410, 4): lambda: self._concerned,
         }
         for axis in self._axes:
-            self.readers[0x2411, axis] = lambda n=axis - 1: self._target(n)
-            self.readers[0x2412, axis] = lambda n=axis - 1: self._actual(n)
-            self.writers[0x2400, axis] = lambda value, n=axis: self._on_pose(n, value)
+            self.readers[0x2411, axis] = partial(self._target, axis - 1)
+            self.readers[0x2412, axis] = partial(self._actual, axis - 1)
+            self.writers[0x2400, axis] = partial(self._on_pose, axis)
             self.writers[0x2402, axis] = _check_finite
         self.writers |= {
             (0x1010, 1): self._on_store,

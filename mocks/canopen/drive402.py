@@ -9,7 +9,7 @@ the manufacturer, says that the drive knows its reference.
 import math
 from pathlib import Path
 
-from canopen.sdo import SdoAbortedError
+from canopen.sdo.exceptions import SdoAbortedError
 
 from mocks.canopen.node import ABORT_DEVICE_STATE, ABORT_RANGE, EMCY_HEARTBEAT, StationNode
 from mocks.canopen.ports import Leg, Machine
@@ -32,6 +32,7 @@ class Drive(StationNode):
 
     def __init__(self, number: int, eds: Path, machine: Machine) -> None:
         super().__init__(number, eds)
+        self.number = number
         self.machine = machine
         self.leg: Leg = machine.legs[number - 1]
         self.state = State.SWITCH_ON_DISABLED
@@ -165,7 +166,7 @@ class Drive(StationNode):
 
     def tick(self) -> None:
         """Look at the leg and at what has gone wrong; called many times a second."""
-        if self.machine.faults.take(f"reference-lost:{self.id}"):
+        if self.machine.faults.take(f"reference-lost:{self.number}"):
             self.referenced = False
         if self.heartbeat_overdue() and self.state is not State.SWITCH_ON_DISABLED:
             self.fail(EMCY_HEARTBEAT)
@@ -192,7 +193,7 @@ class Drive(StationNode):
                 self._homing, self.mode_bit, self.referenced = False, True, True
 
     def _injected(self) -> bool:
-        return str(self.id) in self.machine.faults.arguments("drive-fault")
+        return str(self.number) in self.machine.faults.arguments("drive-fault")
 
     def _follows_badly(self) -> bool:
         error = abs(self.leg.target - self.leg.position()) * COUNTS_PER_MM
@@ -203,7 +204,7 @@ class Drive(StationNode):
         now = self.machine.clock.now()
         if self._following_since is None:
             self._following_since = now
-        return now - self._following_since >= self.value(0x6066) / 1000.0
+        return bool(now - self._following_since >= self.value(0x6066) / 1000.0)
 
     def fail(self, code: int) -> None:
         """Go to fault with ``code``: brake, power off, tell with EMCY."""

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import canopen
-from canopen.sdo import SdoAbortedError
+from canopen.objectdictionary import ODVariable
+from canopen.sdo.exceptions import SdoAbortedError
 
 ABORT_RANGE = 0x0609_0030
 ABORT_CANNOT_STORE = 0x0800_0020
@@ -38,8 +39,9 @@ class StationNode(canopen.LocalNode):
         self._errors: list[int] = []
         self._heard: float | None = None
         self._consumed = 0
-        self.add_read_callback(self._on_read)
-        self.add_write_callback(self._on_write)
+        base: Any = self  # the package's own methods carry no types
+        base.add_read_callback(self._on_read)
+        base.add_write_callback(self._on_write)
         self.readers[0x1001, 0] = lambda: self.error_register
         self.readers[0x1003, 0] = lambda: len(self._errors[:1])
         self.readers[0x1003, 1] = lambda: self._errors[0] if self._errors else 0
@@ -88,12 +90,18 @@ class StationNode(canopen.LocalNode):
 
     def value(self, index: int, subindex: int = 0) -> Any:
         """Return the present value of an object."""
-        variable = self._find_object(index, subindex)
+        variable = self._variable(index, subindex)
         return variable.decode_raw(self.get_data(index, subindex))
+
+    def _variable(self, index: int, subindex: int) -> ODVariable:
+        variable = self.object_dictionary.get_variable(index, subindex)
+        if variable is None:
+            raise KeyError(f"0x{index:04X}:{subindex} is not in the EDS file of node {self.id}")
+        return variable
 
     def keep(self, index: int, subindex: int, value: Any) -> None:
         """Set an object from inside, without its writer."""
-        variable = self._find_object(index, subindex)
+        variable = self._variable(index, subindex)
         self.data_store.setdefault(index, {})[subindex] = variable.encode_raw(value)
 
     # ------------------------------------------------------------ PDO

@@ -1,9 +1,10 @@
 """How the controller shows its parameters on the wire, with what has been made to go wrong."""
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
-from canopen.sdo import SdoAbortedError
+from canopen.sdo.exceptions import SdoAbortedError
 
 from mocks.canopen.node import ABORT_RANGE, real64_block
 from mocks.canopen.parameters import ParameterSet, acceptable
@@ -30,8 +31,8 @@ class ParameterServer:
         self._parameters = parameters
         self._faults = faults
         for name, address in parameters.address.items():
-            controller.readers[address] = lambda n=name: self._read(n)
-            controller.writers[address] = lambda value, n=name: self._write(n, value)
+            controller.readers[address] = partial(self._read, name)
+            controller.writers[address] = partial(self._write, name)
         controller.readers |= {
             (0x2500, 1): lambda: parameters.checksum(self._shown()),
             (0x2500, 2): lambda: parameters.checksum(parameters.stored or parameters.defaults),

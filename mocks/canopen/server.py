@@ -1,6 +1,7 @@
 """The CANopen side of a station: drives and controller on one bus behind an slcan adapter."""
 
 import threading
+from functools import partial
 from pathlib import Path
 
 from drivers.canopen.eds import eds_path
@@ -47,9 +48,9 @@ class CanopenStation:
         self.drives = [Drive(n, drive_eds, world) for n in range(1, len(world.legs) + 1)]
         controller_eds = eds_path(f"{machine}_controller")
         self.controller = Controller(CONTROLLER_NODE, controller_eds, world, self.drives, nvm_path)
-        self.controller.object_dictionary[0x1018][4].default = serial
-        for drive in self.drives:
-            drive.object_dictionary[0x1018][4].default = serial * 10 + drive.id
+        self.controller.readers[0x1018, 4] = lambda: serial
+        for number, drive in enumerate(self.drives, start=1):
+            drive.readers[0x1018, 4] = partial(int, 10 * serial + number)
         self.endpoint = SlcanEndpoint(self._receive, host, port)
         self._bus.endpoint = self.endpoint
         self._wake = threading.Event()
