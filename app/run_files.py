@@ -1,13 +1,13 @@
-"""Reading and writing runs and machine files on disk."""
+"""Reading and writing runs on disk."""
 
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 
+from app.machine_files import load_machine
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
-from calib.mechanism.parse import parse_machine
 from calib.runs import Run, format_run, parse_header, parse_run
+from calib.toml_place import line_of
 
 HEADER = "run.toml"
 POINTS = "points.csv"
@@ -20,47 +20,6 @@ class LoadedRun:
     folder: Path
     run: Run
     machine: Machine
-
-
-def shipped_machines() -> list[str]:
-    """Names of the machines that come with the program."""
-    folder = resources.files("calib") / "machines"
-    return sorted(
-        entry.name.removesuffix(".toml")
-        for entry in folder.iterdir()
-        if entry.name.endswith(".toml")
-    )
-
-
-def load_machine(name: str, *, beside: Path | None = None, place: str = "") -> Machine:
-    """Read a machine that ships with the program, or the file at a path.
-
-    Parameters
-    ----------
-    name : str
-        ``"hexapod"``, or a path; relative paths start at the folder ``beside``.
-    beside : Path, optional
-        The run's folder; the working directory if left out.
-    place : str, optional
-        Where the name stands, for the error message.
-
-    Raises
-    ------
-    BadInput
-        For a name that is neither, and for a faulty machine file.
-    """
-    if name in shipped_machines():
-        text = (resources.files("calib") / "machines" / f"{name}.toml").read_text(encoding="utf-8")
-        return parse_machine(text, f"{name}.toml")
-    path = (beside or Path()) / name
-    if not path.is_file():
-        raise BadInput(
-            f"unknown machine {name!r}",
-            place=place,
-            remedy=f"Expected one of {', '.join(shipped_machines())}, or the path of a machine "
-            f"file relative to the run (looked for {path})",
-        )
-    return parse_machine(read_text(path), str(path))
 
 
 def read_text(path: Path) -> str:
@@ -100,7 +59,13 @@ def read_run(folder: str | Path) -> LoadedRun:
     run_source, points_source = str(folder / HEADER), str(folder / POINTS)
     run_text = read_text(folder / HEADER)
     name = parse_header(run_text, source=run_source).machine
-    machine = load_machine(name, beside=folder, place=f"{run_source}, machine")
+    try:
+        machine = load_machine(name, folder)
+    except BadInput as error:
+        if error.place:
+            raise
+        place = f"{run_source}, line {line_of(run_text, 'machine')}, machine"
+        raise BadInput(error.what, place=place, remedy=error.remedy) from error
     run = parse_run(
         run_text,
         read_text(folder / POINTS),

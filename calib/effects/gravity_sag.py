@@ -20,9 +20,9 @@ def actuator_forces(situation: Situation) -> Array:
     rows = situation.rows
     force, moment = weight_wrench(rows, situation.rotation)
     twists = situation.actuator_twists
-    return np.einsum("inr,nr->ir", twists[:, :3], force) + np.einsum(
-        "inr,nr->ir", twists[:, 3:], moment
-    )
+    forces: Array = np.einsum("icr,cr->ir", twists[:, :3], force)
+    forces += np.einsum("icr,cr->ir", twists[:, 3:], moment)
+    return forces
 
 
 def weight_wrench(rows: Rows, rotation: Array) -> tuple[Array, Array]:

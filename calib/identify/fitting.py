@@ -18,9 +18,9 @@ from scipy import linalg
 
 from calib.arrays import Array, BoolArray
 from calib.errors import BadInput
-from calib.identify.alignment import collinear, robust_align
+from calib.identify.alignment import align, collinear, robust_align
 from calib.identify.readings import BadReading, strays, wrong_place
-from calib.mechanism.rigid import rotate
+from calib.mechanism.rigid import euler_rates, rotate, to_euler
 from calib.mechanism.solve import forward
 from calib.model.prediction import Linearised, Model, State
 
@@ -41,8 +41,8 @@ class Fit:
         Readings in the fit.
     bad : tuple of BadReading
         Readings excluded, with reasons; readings without a needed channel are not among them.
-    covariance : (p, p)
-        Of all unknowns, in their own units, in the order of ``model.names``.
+    step_covariance : (p, p)
+        Of a step of all unknowns as :meth:`Model.moved` takes it: frames by rotation vectors.
     steps : int
         Gauss-Newton steps taken.
     """
@@ -51,7 +51,7 @@ class Fit:
     linear: Linearised
     accepted: BoolArray
     bad: tuple[BadReading, ...]
-    covariance: Array
+    step_covariance: Array
     steps: int
 
     @cached_property
@@ -76,6 +76,11 @@ class Fit:
         state = self.linear.state
         frames = [frame_values(state, run) for run in range(self.model.frames)]
         return np.concatenate([state.parameters[self.model.free], *state.effects, *frames])
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance (p, p) of ``values``: frames by rx, ry, rz."""
+        return _frames_as_angles(self.model, self.linear.state, self.step_covariance)
 
     @cached_property
     def sigmas(self) -> Array:
@@ -117,7 +122,7 @@ class Fit:
     def noise_floor_mm(self) -> float:
         """What ``rms_mm`` would be for a perfect model: sqrt(mean tr(Sigma - J C J^T))."""
         covariance = self.model.rows.covariance[:, :, self.accepted]
-        total = np.einsum("iin->", covariance) - self.explained(self.covariance, self.accepted)
+        total = np.einsum("iin->", covariance) - self.explained(self.step_covariance, self.accepted)
         return float(np.sqrt(max(total, 0.0) / self.readings))
 
     def explained(self, covariance: Array, which: BoolArray) -> float:
@@ -130,8 +135,6 @@ class Fit:
 
 def frame_values(state: State, run: int) -> Array:
     """Base frame of a run in the tracker frame as x, y, z (mm), rx, ry, rz (rad)."""
-    from calib.mechanism.rigid import to_euler
-
     angles = to_euler(state.frame_rotation[:, :, run])
     return np.concatenate([state.frame_position[:, run], angles])
 
@@ -155,23 +158,16 @@ def fit(model: Model, *, start: State | None = None, masked: Sequence[int] = ())
     bad = [_bad(model, row, "masked by the operator") for row in masked]
     allowed = model.usable.copy()
     allowed[list(masked)] = False
-    begin, gross = _begin(model, allowed)
-    if start is not None:
-        begin = replace(
-            start,
-            frame_rotation=start.frame_rotation if start.frame_rotation.size else begin.frame_rotation,
-            frame_position=start.frame_position if start.frame_position.size else begin.frame_position,
-        )
+    linear, gross = begin(model, allowed)
     bad += gross
     accepted = allowed.copy()
     accepted[[reading.row for reading in bad]] = False
-    if accepted.sum() == 0:
-        raise BadInput("no reading is left for the fit", remedy="See the list of bad readings")
-    state, steps = begin, 0
+    if start is not None:
+        linear = model.linearise(_with_frames(start, linear.state))
+    steps = 0
     for _ in range(3):
-        linear, covariance, taken = _optimise(model, state, accepted)
+        linear, covariance, taken = _optimise(model, linear, accepted)
         steps += taken
-        state = linear.state
         found = strays(linear.whitened, linear.jacobian, 1.0 / model.prior**2, accepted)
         if not found:
             break
@@ -179,7 +175,6 @@ def fit(model: Model, *, start: State | None = None, masked: Sequence[int] = ())
             miss = float(np.linalg.norm(linear.residual[:, row]))
             bad.append(_bad(model, row, f"stray: {1000 * miss:.3g} um from where it should be"))
             accepted[row] = False
-    covariance = _frames_as_angles(model, state, covariance)
     return Fit(model, linear, accepted, tuple(bad), covariance, steps)
 
 
@@ -187,27 +182,62 @@ def _bad(model: Model, row: int, why: str) -> BadReading:
     return BadReading(row, int(model.rows.run[row]), int(model.rows.line[row]), why)
 
 
-def _begin(model: Model, allowed: BoolArray) -> tuple[State, list[BadReading]]:
-    """Frames by rigid alignment of the nominal machine's nests; readings in no such place."""
-    rows = model.rows
+def _with_frames(start: State, begun: State) -> State:
+    """Take the frames of the alignment where a start brings none."""
+    if start.frame_position.shape == begun.frame_position.shape:
+        return start
+    return replace(start, frame_rotation=begun.frame_rotation, frame_position=begun.frame_position)
+
+
+def begin(model: Model, allowed: BoolArray) -> tuple[Linearised, list[BadReading]]:
+    """Start at the nominal machine, frames by rigid alignment; and readings in no such place.
+
+    Raises
+    ------
+    BadInput
+        If too few readings stand where the machine's nests can be.
+    """
     base = model.base_points()
-    slack = _slack(model)
+    state, linear = _aligned(model, base, allowed)
+    slack = _slack(model, linear)
+    apart = np.sqrt(np.sum(linear.residual**2, axis=0))
+    if np.all(apart[allowed] < slack[allowed]):
+        return linear, []
+    state, bad = _aligned_robustly(model, base, allowed, slack)
+    return model.linearise(state), bad
+
+
+def _aligned(model: Model, base: Array, allowed: BoolArray) -> tuple[State, Linearised]:
+    """Align all readings of each run."""
+    rows = model.rows
+    rotation, position = np.zeros((3, 3, model.frames)), np.zeros((3, model.frames))
+    for run in range(model.frames):
+        here = np.flatnonzero((rows.run == run) & allowed)
+        if collinear(base[:, here]):
+            raise BadInput(
+                f"{here.size} readings, all on one line, cannot tie the tracker to the machine",
+                place=rows.runs[run].source,
+                remedy="Expected readings at three places at least that are not on one line",
+            )
+        rotation[:, :, run], position[:, run] = align(base[:, here], rows.position[:, here])
+    state = model.start(rotation, position)
+    return state, model.linearise(state)
+
+
+def _aligned_robustly(
+    model: Model, base: Array, allowed: BoolArray, slack: Array
+) -> tuple[State, list[BadReading]]:
+    """Align the majority of each run's readings, and name the others."""
+    rows = model.rows
     rotation, position = np.zeros((3, 3, model.frames)), np.zeros((3, model.frames))
     bad: list[BadReading] = []
     for run in range(model.frames):
         here = np.flatnonzero((rows.run == run) & allowed)
-        name = rows.runs[run].source
-        if collinear(base[:, here]):
-            raise BadInput(
-                f"{here.size} readings, all on one line: they cannot tie the tracker to the machine",
-                place=name,
-                remedy="Expected readings at three places at least that are not on one line",
-            )
         R, t, inside = robust_align(base[:, here], rows.position[:, here], slack[here])
         if inside.sum() < max(3, 0.5 * here.size):
             raise BadInput(
-                f"only {inside.sum()} of {here.size} readings are where this machine's nests can be",
-                place=name,
+                f"only {inside.sum()} of {here.size} readings are where a nest can be",
+                place=rows.runs[run].source,
                 remedy="Check the machine, the nests in run.toml and the units (mm)",
             )
         rotation[:, :, run], position[:, run] = R, t
@@ -230,29 +260,26 @@ def _expected(model: Model, row: int, R: Array, t: Array) -> dict[str, Array]:
     return {name: R @ place + t for name, place in places.items()}
 
 
-def _slack(model: Model) -> Array:
+def _slack(model: Model, linear: Linearised) -> Array:
     """How far (N,) a good reading may be from the aligned nominal machine, mm.
 
     Six sigmas of what the tolerances can do, the alignment's share included, plus a millimetre
     for effects that nobody has modelled.
     """
-    frames = model.frames
-    identity = np.repeat(np.eye(3)[:, :, None], frames, axis=2)
-    bare = Model(model.rows)
-    linear = bare.linearise(bare.start(identity, np.zeros((3, frames))))
-    count = bare.free.size
+    count = model.free.size
     factors = np.linalg.inv(np.moveaxis(model.rows.whitener, -1, 0))
     moved = np.einsum("nij,pjn->pin", factors, linear.jacobian[:count])
-    moved *= model.machine.prior_sigma[bare.free][:, None, None]
+    moved *= model.machine.prior_sigma[model.free][:, None, None]
     spread = np.sqrt(np.sum(moved**2, axis=(0, 1)))
     noise = np.sqrt(np.einsum("iin->n", model.rows.covariance))
-    return 1.0 + 6.0 * (np.maximum(spread, np.median(spread)) + noise)
+    return np.asarray(1.0 + 6.0 * (np.maximum(spread, np.median(spread)) + noise))
 
 
-def _optimise(model: Model, state: State, accepted: BoolArray) -> tuple[Linearised, Array, int]:
+def _optimise(
+    model: Model, linear: Linearised, accepted: BoolArray
+) -> tuple[Linearised, Array, int]:
     """Damped Gauss-Newton; returns the optimum, the covariance of the unknowns and the steps."""
     precision = 1.0 / model.prior**2
-    linear = model.linearise(state)
     cost = _cost(model, linear, accepted, precision)
     damping = 0.0
     for taken in range(1, MAX_STEPS + 1):
@@ -318,8 +345,6 @@ def _inverse(matrix: Array) -> Array:
 
 def _frames_as_angles(model: Model, state: State, covariance: Array) -> Array:
     """Covariance with each frame's rotation vector replaced by rx, ry, rz."""
-    from calib.mechanism.rigid import euler_rates
-
     turn = np.eye(covariance.shape[0])
     first = covariance.shape[0] - 6 * model.frames
     for run in range(model.frames):

@@ -31,7 +31,9 @@ def hold_out(fit: Fit) -> HoldOut:
     """
     rows, jacobian = fit.model.rows, fit.linear.jacobian
     normal = fit.jacobian @ fit.jacobian.T + np.diag(fit.prior_precision)
-    slope = fit.jacobian @ fit.whitened - fit.prior_precision * fit.model.deviation(fit.linear.state)
+    slope = fit.jacobian @ fit.whitened - fit.prior_precision * fit.model.deviation(
+        fit.linear.state
+    )
     scale = 1.0 / np.sqrt(np.diag(normal))
     squares, floor, count = 0.0, 0.0, 0
     for fold in np.unique(rows.fold[rows.fold >= 0]):

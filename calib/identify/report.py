@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from calib.arrays import Array
+from calib.arrays import BoolArray
 from calib.identify.fitting import Fit
 from calib.identify.holdout import hold_out
 
@@ -85,7 +85,7 @@ def parameter_table(fit: Fit) -> list[dict[str, Any]]:
     ]
 
 
-def identified_mask(fit: Fit) -> Array:
+def identified_mask(fit: Fit) -> BoolArray:
     """Which unknowns (p,) the data determine; frames always."""
     return np.asarray(fit.sigmas < IDENTIFIED * fit.model.prior)
 

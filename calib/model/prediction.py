@@ -145,19 +145,23 @@ class Model:
         fixed = ("q", "direction", "step", "extension", "time_s", "progress", "run")
         return name in fixed or name in self.rows.channels
 
+    @cached_property
+    def nominal_configuration(self) -> Configuration:
+        """The nominal machine closed at every distinct machine state."""
+        first, _ = self._states
+        return self._closed(self.rows.extension[:, first], self.machine.nominal, None)
+
     def start(self, rotation: Array, position: Array) -> State:
         """Nominal parameters, no effect, given frames (3, 3, K), (3, K)."""
         effects = tuple(np.zeros(len(group)) for group in self.unknowns)
-        return State(self.machine.nominal.copy(), effects, rotation, position)
+        nominal = self.machine.nominal.copy()
+        return State(nominal, effects, rotation, position, self.nominal_configuration)
 
     def base_points(self) -> Array:
         """SMR centres (3, N) of the nominal machine in the base frame, mm."""
-        first, inverse = self._states
-        poses = self._closed(self.rows.extension[:, first], self.machine.nominal, None).poses
+        poses, (_, inverse) = self.nominal_configuration.poses, self._states
         turned = rotate(poses.rotation[:, :, inverse], self.rows.nest)
-        return np.where(
-            self.rows.on_platform, poses.position[:, inverse] + turned, self.rows.nest
-        )
+        return np.where(self.rows.on_platform, poses.position[:, inverse] + turned, self.rows.nest)
 
     def linearise(self, state: State) -> Linearised:
         """Predict all readings and differentiate.
@@ -206,6 +210,23 @@ class Model:
         parts += self._frame_columns(turned)
         return Linearised(now, residual, _apply(rows.whitener, residual), np.concatenate(parts))
 
+    def predict(self, state: State) -> Array:
+        """What the tracker should read (3, N), mm, without derivatives."""
+        first, inverse = self._states
+        rows, before = self.rows, self._signatures(state)
+        extension = rows.extension + _change(before, "extension", rows.extension)
+        parameters: Array = state.parameters
+        if any(s.parameters is not None for _, s in before):
+            held = np.repeat(state.parameters[:, None], rows.count, axis=1)
+            parameters = (held + _change(before, "parameters", held))[:, first]
+        poses = self._closed(extension[:, first], parameters, state.configuration).poses
+        nest = rows.nest + _change(before, "nest", rows.nest)
+        arm = rotate(poses.rotation[:, :, inverse], nest)
+        base = np.where(rows.on_platform, poses.position[:, inverse] + arm, rows.nest)
+        turned = rotate(state.frame_rotation[:, :, rows.run], base)
+        point = turned + state.frame_position[:, rows.run]
+        return point + _change(before, "point", point)
+
     def _closed(
         self, extension: Array, parameters: Array, start: Configuration | None
     ) -> Configuration:
@@ -232,15 +253,12 @@ class Model:
 
     def _frame_columns(self, turned: Array) -> list[Array]:
         rows = self.rows
-        columns = []
-        for run in range(self.frames):
-            here = (rows.run == run).astype(np.float64)
-            for axis in range(3):
-                columns.append(rows.whitener[:, axis] * here)
-            for axis in range(3):
-                moved = cross(np.eye(3)[axis][:, None], turned)
-                columns.append(_apply(rows.whitener, moved) * here)
-        return [np.array(columns)]
+        motions = np.zeros((6, *turned.shape))
+        for axis in range(3):
+            motions[axis, axis] = 1.0
+            motions[3 + axis] = cross(np.eye(3)[axis][:, None], turned)
+        whitened = _apply_each(rows.whitener, motions)
+        return [whitened * (rows.run == run) for run in range(self.frames)]
 
     def moved(self, state: State, step: Array) -> State:
         """Take a step (p,) of all unknowns; the configuration stays as a warm start."""

@@ -1,0 +1,92 @@
+"""Identify the machine's parameters from runs, with uncertainties
+
+Maximum likelihood over the tracker's readings; see docs/architecture.md.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from app import answer
+from app.analysis import load_rows, model_options
+from app.model_files import write_model
+from calib.identify import fit, fit_report
+from calib.model import Model
+
+
+@click.command()
+@click.argument("runs", nargs=-1, required=True, metavar="RUN...")
+@model_options
+@click.option(
+    "--save", type=click.Path(path_type=Path), help="Write the model with what was found to FILE."
+)
+@answer.json_option
+def command(
+    runs: tuple[str, ...],
+    add: tuple[str, ...],
+    model: Path | None,
+    save: Path | None,
+    as_json: bool,
+) -> None:
+    """Fit the machine's geometry, the tracker's place and the chosen effects to RUN...
+
+    Several runs are fitted together: geometry and machine effects are shared, each run has its own
+    place of the tracker. Nothing is written but the file named with --save.
+    """
+    rows, effects = load_rows(runs, add, model)
+    found = fit(Model(rows, effects))
+    report = fit_report(found)
+    if save is not None:
+        write_model(save, found)
+        answer.say(f"model written to {save}")
+    answer.show(report, as_json, words(report))
+
+
+def words(report: dict[str, Any]) -> str:
+    """Say a fit to a person."""
+    lines = [
+        f"{report['readings']} readings, effects: {', '.join(report['effects']) or 'none'}",
+        "",
+        answer.table(
+            ("", "RMS", "perfect model"),
+            [
+                ("fitted readings", _um(report["rms_um"]), _um(report["noise_floor_um"])),
+                ("held-out poses", _um(report["holdout_rms_um"]), _um(report["holdout_floor_um"])),
+            ],
+        ),
+        f"chi-square per degree of freedom {report['chi2_per_dof']:.3f} (1 is perfect)",
+        "",
+        answer.table(
+            ("parameter", "value", "+-", "change", "in sigmas", "unit", ""),
+            [_row(entry) for entry in report["parameters"]],
+        ),
+    ]
+    if report["unidentified_words"]:
+        lines += ["", *report["unidentified_words"]]
+    if report["bad_readings"]:
+        lines += ["", "Excluded readings:"]
+        lines += [f"  line {bad['line']}: {bad['why']}" for bad in report["bad_readings"]]
+    if report["left_out_readings"]:
+        lines += ["", f"{report['left_out_readings']} readings lack a channel that an effect needs"]
+    for name, why in report["channels_left_aside"].items():
+        lines += ["", f"Column {name} is not a channel: {why}"]
+    return "\n".join(lines)
+
+
+def _um(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f} um"
+
+
+def _row(entry: dict[str, Any]) -> tuple[str, ...]:
+    change = None if entry["nominal"] is None else entry["value"] - entry["nominal"]
+    digits = 4 if entry["unit"] == "mm" else 7
+    return (
+        entry["name"],
+        f"{entry['value']:.{digits}f}",
+        f"{entry['sigma']:.{digits}f}",
+        "" if change is None else f"{change:+.{digits}f}",
+        "" if change is None or not entry["sigma"] else f"{change / entry['sigma']:+.1f}",
+        entry["unit"],
+        "" if entry["identified"] else "not identified",
+    )
