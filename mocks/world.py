@@ -43,8 +43,8 @@ HAND_AWAY = (0.0, 0.0, -1000.0)
 class WorldPlan:
     """How a world is made.
 
-    ``parameters`` are the true ones (drawn by ``seed`` if None); ``smrs`` how many SMRs there
-    are: 1 in the birdbath, 3 in the platform's nests, 7 in all nests.
+    ``parameters`` are the true ones (drawn by ``seed`` if None). ``smrs``: one SMR, in the
+    birdbath, or three, in the platform's nests. ``base_smrs``: each base nest holds its own.
     """
 
     seed: int = 1
@@ -52,6 +52,7 @@ class WorldPlan:
     hidden: Hidden = field(default_factory=Hidden)
     load: Load = field(default_factory=Load)
     smrs: int = 1
+    base_smrs: bool = True
 
 
 class World:
@@ -71,7 +72,7 @@ class World:
         self.station = Station(plan.seed)
         self.distortions = Distortions(plan.hidden)
         self.legs = [LegMotion(self.clock, widths) for widths in play_widths(plan.hidden)]
-        self.smrs = _smrs(plan.smrs)
+        self.smrs = _smrs(plan)
         self._errors = LegErrors(plan.hidden, plan.load)
         self._geometry = true_geometry(self.parameters, plan.hidden)
         self._home_twist = home_twist(self._geometry)
@@ -186,12 +187,13 @@ def solve_pose(
     return forward(g, wanted, start)[0]
 
 
-def _smrs(count: int) -> Smrs:
+def _smrs(plan: WorldPlan) -> Smrs:
     nests = {**dict.fromkeys(PLATFORM_NESTS, "platform"), **dict.fromkeys(BASE_NESTS, "base")}
-    if count == 1:
+    if plan.smrs == 1:
         places = {"smr1": BIRDBATH}
-    elif count in (3, 7):
-        places = {f"smr{i + 1}": nest for i, nest in enumerate(list(nests)[:count])}
+    elif plan.smrs == len(PLATFORM_NESTS):
+        places = {f"smr{i + 1}": nest for i, nest in enumerate(PLATFORM_NESTS)}
     else:
-        raise ValueError(f"a station has 1, 3 or 7 SMRs, not {count}")
-    return Smrs(nests, {**places, "home": BIRDBATH})
+        raise ValueError(f"a station has 1 or {len(PLATFORM_NESTS)} SMRs, not {plan.smrs}")
+    fixed = {f"base-{nest}": nest for nest in BASE_NESTS} if plan.base_smrs else {}
+    return Smrs(nests, {**places, **fixed, "home": BIRDBATH})

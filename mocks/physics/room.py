@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mocks.physics.hexapod import Array, rotation_from_rpy, rotation_from_vector
+from mocks.physics.hexapod import Array, rotation_from_rpy, rotation_from_vector, rpy_from_rotation
 from mocks.physics.hidden import Hidden
 
 BASE_NESTS: dict[str, tuple[float, float, float]] = {
@@ -39,6 +39,10 @@ class Station:
         )
         rx, ry = rng.normal(0.0, 0.004, 2)
         self.rotation = rotation_from_rpy(rx, ry, rng.uniform(-np.pi, np.pi))
+
+    def frame(self) -> list[float]:
+        """x, y, z (mm), rx, ry, rz (rad) of the base frame in the tracker frame."""
+        return [*self.translation.tolist(), *rpy_from_rotation(self.rotation[None])[0].tolist()]
 
     def to_tracker(self, base: Array) -> Array:
         """Points (N, 3) of the base frame in the tracker frame, mm."""

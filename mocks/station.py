@@ -1,0 +1,228 @@
+"""A mock station as a process of its own: ``python -m mocks.station hexapod --json``.
+
+It prints its addresses and runs until SIGINT, SIGTERM or (``--until-stdin-closes``) the end of
+its standard input. With ``--json`` the one line on standard output is::
+
+    {"format": "pkm-mock/1", "machine": "hexapod", "can": "socket://127.0.0.1:PORT",
+     "tracker": "127.0.0.1:PORT", "control": "127.0.0.1:PORT", "scale": 120.0,
+     "site": {...}, "site_file": "..." or null}
+
+``site`` is the content of a site file (pkm-site/1) for this station.
+"""
+
+import argparse
+import asyncio
+import json
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from mocks.canopen.server import CanopenStation
+from mocks.clock import ScaledClock
+from mocks.control import ControlServer, Hands
+from mocks.physics.hidden import Hidden
+from mocks.physics.room import BASE_NESTS, PLATFORM_NESTS
+from mocks.physics.truth import draw_parameters, machine_file, read_parameters
+from mocks.tracker.instrument import SERIAL
+from mocks.tracker.server import TrackerServer
+from mocks.world import World, WorldPlan
+
+CONTROLLER_NODE = 10
+CONTROLLER_SERIAL = 1001
+FRAME_ERROR_MM, FRAME_ERROR_RAD = 3.0, 0.003
+
+
+class MockStation:
+    """World, CAN bus, tracker and control socket of one mock machine."""
+
+    def __init__(
+        self,
+        world: World,
+        clock: ScaledClock,
+        nvm: Path | None = None,
+        ports: tuple[int, int, int] = (0, 0, 0),
+    ) -> None:
+        self.world = world
+        self.clock = clock
+        host = "127.0.0.1"
+        self.can = CanopenStation(world, nvm, host, ports[0], CONTROLLER_SERIAL)
+        self.tracker = TrackerServer(world, clock, host, ports[1])
+        self.control = ControlServer(Hands(world, self.tracker, self.can), host, ports[2])
+
+    async def start(self) -> None:
+        """Power on."""
+        await asyncio.to_thread(self.can.start)
+        await self.tracker.start()
+        await self.control.start()
+
+    async def stop(self) -> None:
+        """Power off."""
+        await self.control.stop()
+        await self.tracker.stop()
+        await asyncio.to_thread(self.can.stop)
+
+    @property
+    def channel(self) -> str:
+        """The CAN adapter as python-can names it."""
+        host, port = self.can.address
+        return f"socket://{host}:{port}"
+
+    def announcement(self, site_file: Path | None = None) -> dict[str, Any]:
+        """What the station says of itself."""
+        return {
+            "format": "pkm-mock/1",
+            "machine": self.world.machine.name,
+            "can": self.channel,
+            "tracker": self.tracker.address,
+            "control": self.control.address,
+            "scale": self.clock.scale,
+            "site": self.site(),
+            "site_file": None if site_file is None else str(site_file),
+        }
+
+    def site(self) -> dict[str, Any]:
+        """A site file for this station, without its ``format``."""
+        plan = self.world.plan
+        return {
+            "title": f"mock {self.world.machine.name}, seed {plan.seed}",
+            "machine": self.world.machine.name,
+            "controller": {
+                "kind": "canopen", "interface": "slcan", "channel": self.channel,
+                "node": CONTROLLER_NODE, "serial": str(CONTROLLER_SERIAL),
+            },
+            "tracker": {
+                "kind": "emscon", "address": self.tracker.address, "serial": str(SERIAL),
+                "model": "AT901-LR", "reflector": "CCR-1.5in", "frame": self._rough_frame(),
+            },
+            "nests": {
+                "platform": {k: list(v) for k, v in PLATFORM_NESTS.items()},
+                "base": {k: list(v) for k, v in BASE_NESTS.items()},
+            },
+            "hands": {
+                "kind": "mock", "control": self.control.address, "smrs": plan.smrs,
+                "base_smrs": plan.base_smrs,
+            },
+            "load": {
+                "gravity": list(plan.load.gravity),
+                "platform_mass_kg": plan.load.platform_mass_kg,
+                "platform_com": list(plan.load.platform_com),
+                "payload_com": list(plan.load.payload_com),
+            },
+            "clock": {"scale": self.clock.scale},
+        }  # fmt: skip
+
+    def _rough_frame(self) -> list[float]:
+        """The base frame in the tracker frame as somebody has measured it with a tape."""
+        rng = np.random.default_rng([self.world.plan.seed, 5])
+        wrong = [FRAME_ERROR_MM] * 3 + [FRAME_ERROR_RAD] * 3
+        exact = self.world.station.frame()
+        return [round(f + w * float(rng.normal()), 4) for f, w in zip(exact, wrong, strict=True)]
+
+
+def _arguments(argv: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="python -m mocks.station",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("machine", choices=["hexapod"])
+    parser.add_argument("--seed", type=int, default=1, help="draws truth, room and noise")
+    parser.add_argument("--scale", type=float, default=1.0, help="machine s per wall s")
+    parser.add_argument("--json", action="store_true", help="print one line of JSON")
+    parser.add_argument("--truth", type=Path, help="true parameters (TOML or JSON)")
+    parser.add_argument("--hidden", type=Path, help="hidden effects (TOML or JSON)")
+    parser.add_argument("--nvm", type=Path, help="file of the controller's stored parameters")
+    parser.add_argument("--smrs", type=int, choices=[1, 3], default=1)
+    parser.add_argument("--no-base-smrs", action="store_true", help="base nests are empty")
+    parser.add_argument("--payload", type=float, default=0.0, help="kg")
+    for name in ("can", "tracker", "control"):
+        parser.add_argument(f"--{name}-port", type=int, default=0)
+    parser.add_argument("--site", type=Path, help="write a site file here")
+    parser.add_argument("--until-stdin-closes", action="store_true", help="end with the parent")
+    return parser.parse_args(argv)
+
+
+def build(options: argparse.Namespace) -> MockStation:
+    """Make the station that the command line asks for; raises ValueError or OSError."""
+    machine = machine_file(options.machine)
+    parameters: Mapping[str, float] = (
+        read_parameters(options.truth, machine)
+        if options.truth is not None
+        else draw_parameters(machine, options.seed)
+    )
+    hidden = Hidden.read(options.hidden) if options.hidden is not None else Hidden()
+    plan = WorldPlan(
+        seed=options.seed,
+        parameters=parameters,
+        hidden=hidden,
+        smrs=options.smrs,
+        base_smrs=not options.no_base_smrs,
+    )
+    clock = ScaledClock(options.scale)
+    world = World(clock, plan)
+    world.payload_kg = options.payload
+    ports = (options.can_port, options.tracker_port, options.control_port)
+    return MockStation(world, clock, options.nvm, ports)
+
+
+async def run(options: argparse.Namespace) -> None:
+    """Start, announce, wait for the end, stop."""
+    station = build(options)
+    loop, over = asyncio.get_running_loop(), asyncio.Event()
+
+    def end(*_: object) -> None:
+        loop.call_soon_threadsafe(over.set)
+
+    for name in ("SIGINT", "SIGTERM", "SIGBREAK"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), end)
+    if options.until_stdin_closes:
+        threading.Thread(target=_watch_stdin, args=(end,), daemon=True).start()
+    await station.start()
+    try:
+        if options.site is not None:
+            site = tomli_w.dumps({"format": "pkm-site/1", **station.site()})
+            options.site.write_text(site, encoding="utf-8")
+        _announce(station.announcement(options.site), options.json)
+        await over.wait()
+    finally:
+        await station.stop()
+
+
+def _announce(announcement: Mapping[str, Any], as_json: bool) -> None:
+    if as_json:
+        print(json.dumps(announcement), flush=True)
+        return
+    for name in ("machine", "can", "tracker", "control", "scale", "site_file"):
+        print(f"{name:10s} {announcement[name]}", flush=True)
+
+
+def _watch_stdin(end: Callable[[], None]) -> None:
+    while os.read(sys.stdin.fileno(), 4096):
+        pass
+    end()
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run a station; exit code 2 for bad input, 3 if a port is taken."""
+    options = _arguments(argv)
+    try:
+        asyncio.run(run(options))
+    except ValueError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2 if error.filename else 3
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
