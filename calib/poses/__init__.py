@@ -5,12 +5,15 @@
 ``design`` does all of it; ``verification`` lays the grid on which a calibration is judged.
 """
 
+from calib.poses.design import Design, design_poses
 from calib.poses.reach import PoseSet, reachable, sample_poses, solve_poses
 from calib.poses.verification import VerificationGrid, verification_poses
 
 __all__ = [
+    "Design",
     "PoseSet",
     "VerificationGrid",
+    "design_poses",
     "reachable",
     "sample_poses",
     "solve_poses",
