@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from app.machine_files import read_text
+from app.poses_file import read_poses
+from app.session.plan import Pose
 from app.toml_reader import TableReader
 from calib.arrays import Array
 from calib.errors import BadInput
@@ -22,7 +24,6 @@ from calib.quantity import quantity
 from calib.toml_place import load_toml
 
 FORMAT = "pkm-poses/1"
-Pose = tuple[float, float, float, float, float, float]
 Q_AGREES = 0.01
 """How far a q written in the file may be from the nominal machine's, mm or rad."""
 
@@ -62,6 +63,13 @@ def read_pose_file(path: Path, machine: Machine) -> PoseFile:
         unknown or not a number, a pose out of reach.
     """
     return parse_pose_file(read_text(path), str(path), machine)
+
+
+def read_any_poses(path: Path, machine: Machine) -> dict[str, Pose]:
+    """Label -> pose from a poses file, or from a bare table that ends in ``.csv``."""
+    if path.suffix.lower() == ".csv":
+        return read_poses(path)
+    return read_pose_file(path, machine).by_label
 
 
 def parse_pose_file(text: str, source: str, machine: Machine) -> PoseFile:

@@ -8,7 +8,7 @@ import click
 
 from app import answer
 from app.console import run_on_console, unattended
-from app.poses_file import read_poses
+from app.pose_files import read_any_poses
 from app.session import Outcome, PlanOptions, Session, measure_plan
 from app.session.plans import Order
 from app.site import load_site
@@ -88,7 +88,7 @@ def command(
     move.
     """
     site = load_site(site_file)
-    poses = read_poses(poses_file)
+    poses = read_any_poses(poses_file, site.machine)
     enough = site.hands.smrs >= len(site.platform_nests)
     chosen = order or ("pose-by-pose" if enough else "nest-by-nest")
     options = PlanOptions(

@@ -8,7 +8,8 @@ import numpy as np
 
 from app import answer
 from app.machine_files import load_machine
-from app.pose_files import nest_matrix, render_design, render_pose_file
+from app.pose_files import full_poses, nest_matrix, render_design, render_pose_file
+from app.poses_file import poses_text
 from app.site import load_site
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
@@ -88,7 +89,9 @@ def command(
         comment += f" --site {site_file}" if site_file else ""
         comment += f" --sigma-um {sigma_um:g}" if sigma_um is not None else ""
         comment += f" --angle-mdeg {angle_mdeg:g}" if angle_mdeg is not None else ""
-        out.write_text(render_design(design, seed, comment), encoding="utf-8")
+        bare = poses_text(full_poses(design.labels, design.pose_set))
+        text = bare if out.suffix == ".csv" else render_design(design, seed, comment)
+        out.write_text(text, encoding="utf-8")
         answer.say(f"written to {out}")
     answer.show(_data(design, seed), as_json, _text(design))
 

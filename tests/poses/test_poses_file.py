@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 from app.machine_files import load_machine
-from app.pose_files import parse_pose_file, read_pose_file
+from app.pose_files import parse_pose_file, read_any_poses, read_pose_file
 from app.verbs.poses import command
 from calib.errors import BadInput
 
@@ -75,3 +75,16 @@ def test_faults_are_named_with_their_line(old: str, new: str, line: int, what: s
 def test_an_empty_list_is_refused() -> None:
     with pytest.raises(BadInput, match="there is no pose"):
         parse_pose_file('format = "pkm-poses/1"\n[poses]\n', "x.toml", load_machine("hexapod"))
+
+
+def test_a_table_of_six_coordinates_is_read_and_written(tmp_path: Path) -> None:
+    out = tmp_path / "poses.csv"
+    arguments = ["hexapod", "--n", "10", "--candidates", "100", "--out", str(out), "--json"]
+    result = CliRunner().invoke(command, arguments)
+    assert result.exit_code == 0, result.output
+    found = read_any_poses(out, load_machine("hexapod"))
+    assert len(found) == 10
+    first = json.loads(result.stdout)["poses"][0]
+    assert found[first["label"]] == pytest.approx(
+        [first[k] for k in ("x", "y", "z", "rx", "ry", "rz")]
+    )
