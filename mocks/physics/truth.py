@@ -3,6 +3,7 @@
 import json
 import tomllib
 from collections.abc import Mapping
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from calib.mechanism.description import Machine
 from calib.mechanism.parse import parse_machine
 
 
+@cache
 def machine_file(name: str) -> Machine:
     """The shipped machine file of this name; raises FileNotFoundError if there is none."""
     source = files("calib").joinpath("machines", f"{name}.toml")

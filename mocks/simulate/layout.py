@@ -1,0 +1,57 @@
+"""Who measures what when: the rows of a campaign, before anything is measured."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mocks.physics.hexapod import Array
+from mocks.physics.room import BASE_NESTS
+from mocks.simulate.plan import RunPlan
+
+HOME = -1
+FIRST_S, MOVE_S, NEXT_NEST_S, BASE_BEFORE_S = 10.0, 10.0, 4.0, 4.0
+
+
+@dataclass(frozen=True)
+class Layout:
+    """R rows in the order of the run.
+
+    ``pose`` (R,) index of the commanded pose, -1 = home; ``nest`` names, "" for a move without a
+    reading; ``labelled`` (R,) whether the row carries its pose's label; ``time`` (R,) s.
+    """
+
+    pose: NDArray[np.intp]
+    nest: tuple[str, ...]
+    labelled: NDArray[np.bool_]
+    time: Array
+
+    @property
+    def reading(self) -> NDArray[np.bool_]:
+        """Rows that are readings, (R,)."""
+        return np.array([bool(name) for name in self.nest])
+
+
+def arrange(plan: RunPlan, poses: int) -> Layout:
+    """Rows of a campaign: home, base nests, poses and nests with base nests between, base nests."""
+    if plan.order == "nest-by-nest":
+        visits = [(p, nest) for nest in plan.nests for p in range(poses)]
+    else:
+        visits = [(p, nest) for p in range(poses) for nest in plan.nests]
+    rows: list[tuple[int, str, bool, float]] = [(HOME, "", True, 0.0)]
+    time, before = FIRST_S - MOVE_S, HOME
+
+    def base_nests(pose: int, at: float) -> None:
+        rows.extend((pose, nest, False, at) for nest in BASE_NESTS)
+
+    for count, (pose, nest) in enumerate(visits):
+        time += NEXT_NEST_S if pose == before else MOVE_S
+        if count % plan.base_every == 0:
+            base_nests(pose if count else HOME, time - BASE_BEFORE_S)
+        rows.append((pose, nest, True, time))
+        before = pose
+    base_nests(before, time + NEXT_NEST_S)
+    pose_index, nests, labelled, times = zip(*rows, strict=True)
+    return Layout(
+        np.array(pose_index), tuple(nests), np.array(labelled), np.array(times, dtype=float)
+    )

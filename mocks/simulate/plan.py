@@ -1,0 +1,75 @@
+"""What a simulated campaign is: machine, poses, order, noise, climate, load, hidden effects."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from mocks.physics.extension import Load
+from mocks.physics.hexapod import Array
+from mocks.physics.hidden import Hidden
+
+Order = Literal["nest-by-nest", "pose-by-pose"]
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Channels over the run.
+
+    The structure warms by ``rise_K`` in all, saturating; the air wanders. ``payload_kg`` is
+    constant, or a sequence of masses that are put on in turn, each for an equal part of the run.
+    """
+
+    start_C: float = 20.0  # noqa: N815 (units)
+    rise_K: float = 6.0  # noqa: N815
+    air_C: float = 20.4  # noqa: N815
+    payload_kg: tuple[float, ...] = (0.0,)
+
+
+@dataclass(frozen=True)
+class RunPlan:
+    """One campaign.
+
+    Attributes
+    ----------
+    seed : int
+        Draws truth, room, noise and, where ``poses`` is a number, the poses.
+    poses : int or array, shape (N, 6)
+        How many random reachable poses, or the poses: x, y, z in mm, rx, ry, rz in rad.
+    order : {"nest-by-nest", "pose-by-pose"}
+        One SMR that is carried after each pass, or three SMRs.
+    noise_mm : float or None
+        Standard deviation per axis of every reading; None: radial and angular parts of a tracker,
+        with covariances in the file.
+    base_every : int
+        Readings between two visits of the base nests.
+    parameters : mapping, optional
+        True parameters; drawn by ``seed`` from ``prior`` if None.
+    controller : mapping
+        Parameters that the controller uses where they are not nominal.
+    delays : bool
+        Whether the file has a column ``delay_s`` (it has one whenever something settles).
+    strays : int
+        So many readings are off by 0.2 mm to 2 mm.
+    """
+
+    seed: int = 1
+    poses: int | Array = 60
+    order: Order = "nest-by-nest"
+    nests: tuple[str, ...] = ("3", "4", "5")
+    noise_mm: float | None = 0.005
+    base_every: int = 45
+    hidden: Hidden = field(default_factory=Hidden)
+    parameters: Mapping[str, float] | None = None
+    prior: Literal["uniform", "normal"] = "uniform"
+    controller: Mapping[str, float] = field(default_factory=dict)
+    profile: Profile = field(default_factory=Profile)
+    load: Load = field(default_factory=Load)
+    delays: bool = False
+    strays: int = 0
+    title: str = ""
+
+    def rng(self, purpose: int) -> np.random.Generator:
+        """A generator of its own for each purpose, so that one choice does not shift another."""
+        return np.random.default_rng([self.seed, 100 + purpose])
