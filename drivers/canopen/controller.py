@@ -9,34 +9,18 @@ import math
 import struct
 import time
 from collections.abc import Callable, Mapping
-from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
 from drivers.canopen import layout as at
-from drivers.canopen.drive402 import (
-    DISABLE_VOLTAGE,
-    QUICK_STOP,
-    REFERENCED,
-    STATUSWORD,
-    Drive402,
-    drive_fault,
-    state_name,
-)
+from drivers.canopen.drive402 import DISABLE_VOLTAGE, REFERENCED, STATUSWORD, Drive402, state_name
 from drivers.canopen.eds import eds_path
-from drivers.canopen.layout import Layout, read_layout
-from drivers.canopen.link import BusAddress, CanLink, Device
-from drivers.canopen.motion import MOVE_TO_POSE, MOVE_TO_Q, PREPARE, STOP, MotionChannel
+from drivers.canopen.layout import read_layout
+from drivers.canopen.link import BusAddress, CanLink
+from drivers.canopen.machine_bus import MachineBus
+from drivers.canopen.motion import MOVE_TO_POSE, MOVE_TO_Q, PREPARE
 from drivers.canopen.parameter_access import ParameterAccess
-from drivers.canopen.recognise import check_limits, check_serial, read_identity
-from drivers.errors import (
-    ConnectFailed,
-    DeviceError,
-    DeviceFault,
-    LinkError,
-    Refused,
-    Silence,
-)
+from drivers.errors import LinkError, Refused, Silence
 from drivers.interface import ActuatorState, Alarm, ControllerState, Identity
 
 T = TypeVar("T")
@@ -51,24 +35,15 @@ class CanopenController:
     :meth:`clear_faults`; after a lost link only a new :meth:`connect` helps.
     """
 
-    def __init__(self, link: CanLink, layout: Layout, node_id: int, eds: Path) -> None:
-        self.identity = Identity("canopen-controller")
-        self.layout = layout
-        self._link = link
-        self._controller = link.add_device(node_id, eds, f"controller (node {node_id})")
-        self._device = self._controller.label
-        self._drives = []
-        drive_eds = eds_path("drive402")
-        for number, name in enumerate(layout.actuators, start=1):
-            device = link.add_device(number, drive_eds, f"drive {name} (node {number})")
-            self._drives.append(Drive402(device, name))
-        self._devices = [self._controller, *(drive.remote for drive in self._drives)]
-        self._motion = MotionChannel(self._controller, layout)
-        self._parameters = ParameterAccess(self._controller, layout)
-        self._callbacks: list[Callable[[Alarm], None]] = []
+    def __init__(self, bus: MachineBus, identity: Identity) -> None:
+        self.identity = identity
+        self.layout = bus.layout
+        self._bus = bus
+        self._drives = bus.drives
+        self._motion = bus.motion
+        self._device = bus.controller.label
+        self._parameters = ParameterAccess(bus.controller, bus.layout)
         self._stopped = False
-        link.on_fault = self._on_fault
-        link.on_emergency = self._on_emergency
 
     # ------------------------------------------------------------ connecting
 
@@ -118,88 +93,25 @@ class CanopenController:
         )
         link = await CanLink.open(address)
         try:
-            controller = cls(link, layout, node_id, path)
-            await controller._recognise(serial, limits or {})
-            await controller._watch_nodes()
+            bus = MachineBus(link, layout, node_id, path)
+            identity = await bus.recognise(serial, limits or {})
+            await bus.watch()
+            await bus.note_faults()
         except BaseException:
             await link.close()
             raise
-        return controller
-
-    async def _recognise(
-        self, serial: str | None, limits: Mapping[str, tuple[float, float]]
-    ) -> None:
-        try:
-            self.identity = await self._call(lambda: read_identity(self._controller, self.layout))
-        except Silence as error:
-            raise ConnectFailed(
-                f"the adapter answers, {self._device} does not",
-                device=self._link.name,
-                remedy="Check that the controller is switched on, its node number and bit rate.",
-            ) from error
-        check_serial(self.identity, serial, self._device)
-        await self._call(lambda: check_limits(self._controller, self.layout, limits))
-
-    async def _watch_nodes(self) -> None:
-        """Configure both heartbeats, set all nodes OPERATIONAL and hear each of them once."""
-        address = self._link.address
-        producer = struct.pack("<H", round(address.heartbeat_s * 1000))
-        consumer = struct.pack("<I", address.pc_node << 16 | round(address.silence_s * 1000))
-
-        def configure(device: Device) -> None:
-            device.download(0x1017, 0, producer)
-            device.download(0x1016, 1, consumer)
-
-        begin = time.monotonic()
-        try:
-            for device in self._devices:
-                await device.call(partial(configure, device))
-        except Silence as error:
-            raise ConnectFailed(error.what, device=error.device, remedy=error.remedy) from error
-        await self._link.operational()
-        while missing := [d for d in self._devices if not self._link.heard_since(d.id, begin)]:
-            if time.monotonic() - begin > address.silence_s + ANSWER_DEADLINE_S:
-                names = ", ".join(device.label for device in missing)
-                raise ConnectFailed(
-                    f"no heartbeat from {names}",
-                    device=self._link.name,
-                    remedy="Check that all devices are switched on.",
-                )
-            await asyncio.sleep(0.01)
-        await self._motion.synchronise()
-        for drive in self._drives:
-            if state_name(await drive.read(STATUSWORD)) == "fault":
-                self._latch_drive(drive.remote.id, await drive.read(0x603F))
+        return cls(bus, identity)
 
     async def _call(self, action: Callable[[], T]) -> T:
-        return await self._controller.call(action)
-
-    # ------------------------------------------------------------ what comes unasked
+        return await self._bus.controller.call(action)
 
     def on_alarm(self, callback: Callable[[Alarm], None]) -> None:
         """Call ``callback`` in the event loop for everything said unasked."""
-        self._callbacks.append(callback)
+        self._bus.callbacks.append(callback)
 
     def check(self) -> None:
         """Raise the fault that is standing (link lost, heartbeat lost, drive fault), if any."""
-        self._link.check()
-
-    def _alarm(self, alarm: Alarm) -> None:
-        for callback in self._callbacks:
-            callback(alarm)
-
-    def _on_fault(self, fault: DeviceError) -> None:
-        self._alarm(Alarm(fault.device, fault.what, fault.remedy, fault=True))
-        self._motion.wake()
-
-    def _on_emergency(self, node_id: int, code: int, _register: int) -> None:
-        if code == 0:
-            self._alarm(Alarm(self._link.label(node_id), "the error is gone"))
-        else:
-            self._latch_drive(node_id, code)
-
-    def _latch_drive(self, node_id: int, code: int) -> None:
-        self._link.latch(f"drive {node_id}", drive_fault(self._link.label(node_id), code))
+        self._bus.link.check()
 
     # ------------------------------------------------------------ state
 
@@ -226,7 +138,7 @@ class CanopenController:
         return ControllerState(actuators, status.moving, status.enabled, await self.channels())
 
     def _fault_of(self, drive: Drive402) -> str:
-        fault = self._link.faults.get(f"drive {drive.remote.id}")
+        fault = self._bus.link.faults.get(f"drive {drive.remote.id}")
         return fault.what if fault is not None else ""
 
     async def channels(self) -> dict[str, float]:
@@ -234,7 +146,7 @@ class CanopenController:
         addresses = self.layout.channels
 
         def read() -> dict[str, float]:
-            data = {name: self._controller.upload(*place) for name, place in addresses.items()}
+            data = {name: self._bus.controller.upload(*place) for name, place in addresses.items()}
             return {name: struct.unpack("<d", raw)[0] for name, raw in data.items()}
 
         return await self._call(read)
@@ -242,9 +154,16 @@ class CanopenController:
     # ------------------------------------------------------------ power
 
     async def enable(self) -> None:
-        """Bring all drives to operation enabled; raises DriveFault, Silence, Refused."""
+        """Bring all drives to operation enabled; raises DriveFault, Silence, Refused.
+
+        If one of them cannot, the others are switched off again.
+        """
         self.check()
-        await asyncio.gather(*(drive.enable() for drive in self._drives))
+        walks = (drive.enable() for drive in self._drives)
+        failures = [f for f in await asyncio.gather(*walks, return_exceptions=True) if f]
+        if failures:
+            await self._bus.send_stop(DISABLE_VOLTAGE)
+            raise failures[0]
         self._stopped = False
         if not await self._motion.until(lambda status: status.enabled, ANSWER_DEADLINE_S):
             raise Silence(
@@ -261,17 +180,10 @@ class CanopenController:
     async def clear_faults(self) -> None:
         """Reset standing faults; motion stays disabled until :meth:`enable`.
 
-        Raises DriveFault if a drive stays in fault, HeartbeatLost if a node stays silent, and
+        Raises DriveFault if a drive stays in fault, ConnectFailed if a node stays silent, and
         LinkLost if the link is gone.
         """
-        self._link.clear_faults()
-        self.check()
-        # A node that was switched off meanwhile has forgotten whom it watches.
-        await self._watch_nodes()
-        for drive in self._drives:
-            await drive.clear_fault()
-            self._link.unlatch(f"drive {drive.remote.id}")
-        self.check()
+        await self._bus.clear()
 
     # ------------------------------------------------------------ motion
 
@@ -290,10 +202,10 @@ class CanopenController:
         drive = self._drive(actuator)
         sub = self.layout.actuators.index(actuator) + 1
         await self._call(
-            lambda: self._controller.download(at.COMMANDED_Q, sub, struct.pack("<d", q))
+            lambda: self._bus.controller.download(at.COMMANDED_Q, sub, struct.pack("<d", q))
         )
         await self._motion.command(PREPARE + sub)
-        data = await self._call(lambda: self._controller.upload(at.SETPOINTS, sub))
+        data = await self._call(lambda: self._bus.controller.upload(at.SETPOINTS, sub))
         await drive.move_to(int.from_bytes(data, "little", signed=True), SINGLE_MOTION_DEADLINE_S)
 
     def _drive(self, actuator: str) -> Drive402:
@@ -324,7 +236,7 @@ class CanopenController:
 
         def write() -> None:
             for sub, value in enumerate(q, start=1):
-                self._controller.download(at.COMMANDED_Q, sub, struct.pack("<d", value))
+                self._bus.controller.download(at.COMMANDED_Q, sub, struct.pack("<d", value))
 
         await self._call(write)
         await self._motion.command(MOVE_TO_Q)
@@ -352,11 +264,9 @@ class CanopenController:
         off; :meth:`enable` brings them back. Raises LinkLost if the frames cannot be sent, Silence
         if the machine does not come to rest.
         """
-        quick = struct.pack("<H", QUICK_STOP)
-        frames = [(0x200 + drive.remote.id, quick) for drive in self._drives]
         again, self._stopped = self._stopped, True
         try:
-            await self._link.send([self._motion.command_frame(STOP), *frames])
+            await self._bus.send_stop()
             await self._rest()
         except LinkError as error:
             if not again:
@@ -408,15 +318,4 @@ class CanopenController:
 
     async def close(self) -> None:
         """Take the power off, let the nodes stop watching this PC, release the link."""
-        if self._link.closed:
-            return
-        off = struct.pack("<H", DISABLE_VOLTAGE)
-        try:
-            if "link" not in self._link.faults:
-                frames = [(0x200 + drive.remote.id, off) for drive in self._drives]
-                await self._link.send([self._motion.command_frame(STOP), *frames])
-                for device in self._devices:
-                    await device.call(partial(device.download, 0x1016, 1, bytes(4)))
-        except (DeviceError, DeviceFault) as error:
-            self._alarm(Alarm(self._device, f"closed without a farewell: {error.what}"))
-        await self._link.close()
+        await self._bus.leave()

@@ -26,6 +26,7 @@ from drivers.canopen.sdo_abort import REMEDIES, abort_words
 from drivers.errors import (
     ConnectFailed,
     DeviceError,
+    DeviceFault,
     HeartbeatLost,
     LinkLost,
     Refused,
@@ -36,6 +37,7 @@ logger = logging.getLogger(__name__)
 T = TypeVar("T")
 
 WATCH_PERIOD_S = 0.05
+BOOT_UP = 0
 SDO_DEADLINE_S = 1.0
 REMEDY_LINK = "Check cable, adapter and power; then connect again. The machine stops by itself."
 
@@ -147,7 +149,7 @@ class CanLink:
         node.rpdo.read(from_od=True)
         self._locks[node_id] = threading.Lock()
         self._labels[node_id] = label
-        node.nmt.add_heartbeat_callback(lambda _state: self._hear(node_id))
+        node.nmt.add_heartbeat_callback(lambda state: self._hear(node_id, state))
         node.emcy.add_callback(lambda emcy: self._hear_emergency(node_id, emcy))
         return Device(self, node_id, label, node)
 
@@ -162,9 +164,12 @@ class CanLink:
 
         Raises Refused (SDO abort, with code), Silence (no answer) or LinkLost.
         """
+        self._must_be_open()
+        return await self._loop.run_in_executor(self._workers, self._locked, node_id, action)
+
+    def _must_be_open(self) -> None:
         if self.closed:
             raise LinkLost("the link is closed", device=self.name, remedy="Connect again.")
-        return await self._loop.run_in_executor(self._workers, self._locked, node_id, action)
 
     def _locked(self, node_id: int, action: Callable[[], T]) -> T:
         with self._locks[node_id]:
@@ -201,6 +206,7 @@ class CanLink:
 
     async def send(self, frames: list[tuple[int, bytes]]) -> None:
         """Send frames (COB-ID, data) in this order; raises LinkLost."""
+        self._must_be_open()
         await self._loop.run_in_executor(self._workers, self._send_all, frames)
 
     def _send_all(self, frames: list[tuple[int, bytes]]) -> None:
@@ -222,7 +228,16 @@ class CanLink:
         """Whether a node's heartbeat came after ``moment`` (time.monotonic)."""
         return self._heard.get(node_id, -1.0) > moment
 
-    def _hear(self, node_id: int) -> None:
+    def _hear(self, node_id: int, state: int) -> None:
+        if state == BOOT_UP:
+            self.latch(
+                f"restart {node_id}",
+                DeviceFault(
+                    "was switched off and on: what was not stored is lost",
+                    device=self.label(node_id),
+                    remedy="Clear the faults, compare the parameters and enable the machine again.",
+                ),
+            )
         self._heard[node_id] = time.monotonic()
 
     def _hear_emergency(self, node_id: int, emcy: EmcyError) -> None:

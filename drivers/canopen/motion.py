@@ -111,7 +111,8 @@ class MotionChannel:
             command = self.command_frame(code)
             sequence = self._sequence
             await self._link.send([*frames, command])
-            if not await self.until(lambda s: s.sequence == sequence, ANSWER_DEADLINE_S):
+            # A stop may overtake: an answer to a later command answers this one too.
+            if not await self.until(lambda s: s.answers(sequence), ANSWER_DEADLINE_S):
                 raise Silence(
                     f"no answer to a motion command within {ANSWER_DEADLINE_S} s",
                     device=self._device,

@@ -43,6 +43,10 @@ class MotionStatus:
         """Read the eight bytes of the TPDO."""
         return cls(*struct.unpack("<4H", data))
 
+    def answers(self, sequence: int) -> bool:
+        """Whether this is the answer to command ``sequence`` or to a later one."""
+        return (self.sequence - sequence) % 0x10000 < 0x8000
+
     @property
     def enabled(self) -> bool:
         """Whether every drive takes set-points."""

@@ -88,6 +88,7 @@ class Controller(StationNode):
         self._received: set[int] = set()
         self._ends_at = -math.inf
         self._under_way = self._interrupted = self._arrived = False
+        self._pc_lost = False
         self._concerned, self._result = 0, Result.ACCEPTED
         self._reported = -1
         self._install()
@@ -315,7 +316,11 @@ class Controller(StationNode):
         """Watch the motion and the PC; called many times a second, after the drives."""
         if self.heartbeat_overdue():
             self.halt()
+            self._pc_lost = True
             self.emergency(EMCY_HEARTBEAT, 0x11)
+        elif self._pc_lost and self.hears_pc:
+            self._pc_lost = False
+            self.emergency(0, 0)
         if self._under_way and not self.enabled:
             self.halt()
         if self._under_way and all(drive.settled for drive in self.drives):
@@ -345,7 +350,7 @@ class Controller(StationNode):
         self._wanted = list(self._setpoints)
         self._targets = [self._reference(n) + self._wanted[n] for n in range(count)]
         self._received.clear()
-        self._under_way = self._interrupted = self._arrived = False
+        self._under_way = self._interrupted = self._arrived = self._pc_lost = False
         self._concerned, self._result, self._reported = 0, Result.ACCEPTED, -1
         self.boot()
         if not intact:

@@ -147,6 +147,11 @@ class StationNode(canopen.LocalNode):
             self._heard = time.monotonic()
             self._consumed = watched
 
+    @property
+    def hears_pc(self) -> bool:
+        """Whether the watched producer has been heard since its last silence."""
+        return self._heard is not None
+
     def heartbeat_overdue(self) -> bool:
         """Whether the watched producer was heard once and is silent now; true once a silence."""
         watched = self.value(0x1016, 1)
