@@ -1,0 +1,295 @@
+"""What the operator has in front of him: a site, a station, perhaps a mock, perhaps a session.
+
+The screens call these coroutines and nothing else. Errors are raised to the program, which puts
+them on the banner. Nothing here draws.
+"""
+
+import asyncio
+import contextlib
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from app.errors import GateRefused, StoppedByOperator
+from app.session.events import DeviceStates
+from app.session.plan import Plan
+from app.session.session import Outcome, Session
+from app.session.station import Station
+from app.site import Site, load_site, site_of_mock
+from app.tui.picture import Picture
+from drivers.errors import ConnectFailed, DeviceError, Silence
+
+MOCK_START_S = 30.0
+MOCK_END_S = 5.0
+POLL_S = 0.5
+
+
+class Desk:
+    """One site at a time; see the module's head.
+
+    Parameters
+    ----------
+    root : Path
+        Folder under which new sessions get theirs.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.picture = Picture()
+        self.site: Site | None = None
+        self.station: Station | None = None
+        self.session: Session | None = None
+        self.mock: asyncio.subprocess.Process | None = None
+        self._mock_log: asyncio.Task[None] | None = None
+        self._job: asyncio.Task[Outcome] | None = None
+        self._connecting = False
+
+    # site and mock
+
+    async def open_site(self, path: Path) -> None:
+        """Read a site file; the devices of another site are let go first."""
+        site = load_site(path)
+        await self._use(site)
+
+    async def _use(self, site: Site) -> None:
+        self._not_while_busy("change the site")
+        await self.disconnect()
+        self.site = site
+        self.station = Station(site)
+        self.station.observers.watch(self.picture.tell)
+        self.picture.write(f"site {site.title or site.source}")
+
+    async def start_mock(self, arguments: Sequence[str] = ("hexapod",)) -> None:
+        """Start a mock station as a process and take its site; raises a DeviceError if it fails."""
+        self._not_while_busy("start a mock")
+        await self.end_mock()
+        # However this program ends, its mock's standard input ends with it, and so does the mock.
+        ends_with_us = ("--json", "--until-stdin-closes")
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", "mocks.station", *arguments, *ends_with_us),
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
+        )
+        self.mock = process
+        assert process.stdout is not None
+        try:
+            async with asyncio.timeout(MOCK_START_S):
+                line = await process.stdout.readline()
+        except TimeoutError as error:
+            await self.end_mock()
+            raise Silence(
+                f"said nothing within {MOCK_START_S:.0f} s", device="mock station"
+            ) from error
+        if not line:
+            said = await self._last_words(process)
+            await self.end_mock()
+            raise ConnectFailed(f"it ended at once: {said}", device="mock station")
+        # Pipes that nobody reads fill up and block the station.
+        self._mock_log = asyncio.create_task(self._drain(process))
+        await self._use(site_of_mock(json.loads(line)))
+        self.picture.write("mock station started", "good")
+
+    async def _last_words(self, process: asyncio.subprocess.Process) -> str:
+        assert process.stderr is not None
+        try:
+            async with asyncio.timeout(MOCK_END_S):
+                lines = (await process.stderr.read()).decode(errors="replace").strip().splitlines()
+        except TimeoutError:
+            return "no reason given"
+        return lines[-1] if lines else "no reason given"
+
+    async def _drain(self, process: asyncio.subprocess.Process) -> None:
+        async def read(stream: asyncio.StreamReader | None) -> None:
+            while stream is not None and (line := await stream.readline()):
+                self.picture.write(f"mock: {line.decode(errors='replace').rstrip()}")
+
+        await asyncio.gather(read(process.stdout), read(process.stderr))
+
+    async def end_mock(self) -> None:
+        """End the mock station that was started here, if any."""
+        process, self.mock = self.mock, None
+        if process is None:
+            return
+        if process.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                process.terminate()
+            try:
+                async with asyncio.timeout(MOCK_END_S):
+                    await process.wait()
+            except TimeoutError:
+                process.kill()
+                await process.wait()
+        if self._mock_log is not None:
+            self._mock_log.cancel()
+            self._mock_log = None
+
+    # devices
+
+    @property
+    def connected(self) -> bool:
+        """Whether both devices are connected."""
+        return self.station is not None and self.station.connected
+
+    async def connect(self) -> None:
+        """Connect to the site's devices; raises a DeviceError or GateRefused."""
+        if self.connected or self._connecting:
+            return
+        station = self._need_station()
+        self._connecting = True
+        try:
+            await station.connect()
+            self.picture.trouble = None
+            await station.poll()
+        finally:
+            self._connecting = False
+
+    async def disconnect(self) -> None:
+        """Let the devices go."""
+        self._not_while_busy("disconnect")
+        if self.station is not None and self.station.connected:
+            await self.station.close()
+
+    async def poll(self) -> DeviceStates | None:
+        """Ask for the devices' states, but never into a running job: that tells by itself."""
+        if self.connected and not self.busy and self.station is not None:
+            return await self.station.poll()
+        return None
+
+    async def clear_faults(self) -> None:
+        """Reset standing faults of the drives; they stay without power."""
+        station = self._idle_station("clear faults")
+        await station.controller.clear_faults()
+        self.picture.trouble = None
+        self.picture.write("faults cleared; drives are off", "good")
+        await station.poll()
+
+    async def power(self, on: bool) -> None:
+        """Switch the drives on or off."""
+        station = self._idle_station("switch the drives")
+        await (station.controller.enable() if on else station.controller.disable())
+        await station.poll()
+
+    # the job
+
+    @property
+    def busy(self) -> bool:
+        """Whether a session runs."""
+        return self._job is not None and not self._job.done()
+
+    async def run(self, plan: Plan) -> Outcome:
+        """Begin a session with this plan and run it to its end; raises what ended it early."""
+        station = self._idle_station("begin")
+        return await self._run(Session.create(station.site, plan, self.root, station=station))
+
+    async def go_on(self, folder: Path) -> Outcome:
+        """Go on with a session that ended early."""
+        station = self._idle_station("go on")
+        return await self._run(Session.reopen(folder, station=station))
+
+    async def _run(self, session: Session) -> Outcome:
+        self.session = session
+        self.picture.begin(session)
+        self._job = session.start()
+        await asyncio.sleep(0)  # the session recalls from its journal where the base is
+        self.picture.recall(session)
+        try:
+            return await self._job
+        except (StoppedByOperator, GateRefused, DeviceError) as end:
+            if self.picture.busy:  # nobody told yet how it ended
+                self.picture.run = "stopped" if isinstance(end, StoppedByOperator) else "fault"
+            raise
+        finally:
+            session.journal.close()
+
+    def pause_or_resume(self) -> None:
+        """Hold after the step in work, or go on."""
+        session = self._running_session()
+        if session.paused:
+            session.resume()
+        else:
+            session.pause()
+
+    def skip(self) -> None:
+        """Leave the step in work out."""
+        self._running_session().skip("left out by the operator")
+
+    def answer(self, prompt: str, choice: str) -> None:
+        """Answer the session's question."""
+        self._running_session().answer_prompt(prompt, choice)
+
+    async def stop(self) -> str:
+        """Stop whatever moves, at any moment. Returns what was done, in words."""
+        if self.busy and self.session is not None:
+            await self.session.stop()
+            return "stopped; the machine stands still"
+        if self.connected and self.station is not None:
+            confirmed = await self.station.safe_stop()
+            return "all motion stopped" if confirmed else "STOP NOT CONFIRMED: use the e-stop"
+        return "nothing is connected, nothing moves"
+
+    async def close(self) -> None:
+        """End everything that was begun here."""
+        if self.busy and self.session is not None and self._job is not None:
+            await self.session.stop()
+            with contextlib.suppress(StoppedByOperator, DeviceError, asyncio.CancelledError):
+                await self._job
+        if self.station is not None:
+            await self.station.close()
+        await self.end_mock()
+
+    # who is allowed what
+
+    def _need_station(self) -> Station:
+        if self.station is None:
+            raise ConnectFailed(
+                "no site is open", remedy="Open a site file (o) or start a mock (m) first"
+            )
+        return self.station
+
+    def check_idle(self, wish: str) -> None:
+        """Raise what stands against beginning a job: nothing connected, or a job that runs."""
+        self._idle_station(wish)
+
+    def _idle_station(self, wish: str) -> Station:
+        station = self._need_station()
+        if not station.connected:
+            raise ConnectFailed(
+                f"cannot {wish}: the devices are not connected",
+                remedy="Connect on the Devices screen first",
+            )
+        self._not_while_busy(wish)
+        return station
+
+    def _not_while_busy(self, wish: str) -> None:
+        if self.busy:
+            raise GateRefused(f"cannot {wish} while a job runs", remedy="Stop the job first")
+
+    def _running_session(self) -> Session:
+        if self.session is None or not self.busy:
+            raise GateRefused("no job runs", remedy="Start one on the Measure screen")
+        return self.session
+
+
+def said(error: Exception) -> tuple[str, str]:
+    """Split an error of ours into what happened and what to do."""
+    what = str(getattr(error, "what", "") or error)
+    device = str(getattr(error, "device", ""))
+    place = str(getattr(error, "place", ""))
+    where = device or place
+    remedy = str(getattr(error, "remedy", ""))
+    return (f"{where}: {what}" if where else what), remedy
+
+
+def channel_text(channels: Mapping[str, Any]) -> str:
+    """Render a machine's channels: ``structure_temp_C`` becomes ``structure temp 20.13 C``."""
+    units = {"C": "C", "kg": "kg", "hPa": "hPa", "s": "s", "mm": "mm"}
+    parts = []
+    for name, value in channels.items():
+        *words, last = name.split("_")
+        unit = units.get(last, "")
+        label = " ".join(words if unit else [*words, last])
+        parts.append(f"{label} {value:.2f} {unit}".rstrip())
+    return "   ".join(parts)

@@ -1,0 +1,239 @@
+"""Devices: open a site or start a mock, connect, see what the devices say of themselves."""
+
+from pathlib import Path
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.content import Content
+from textual.widgets import Static
+
+from app.session.events import Connected
+from app.site import Site
+from app.tui.desk import channel_text
+from app.tui.dialogs import Choose, Enter, Pick, site_candidates
+from app.tui.face import Face
+from app.tui.picture import Picture
+from drivers.interface import ActuatorState, ControllerState, TrackerState
+
+
+class DevicesFace(Face):
+    """The first screen."""
+
+    mode = "devices"
+    label = "Devices"
+    about = (
+        "Open the site file of your lab (o), or start a mock machine to practise on (m). Then "
+        "connect (c): the devices' identities are compared with the site file. Nothing moves "
+        "on this screen."
+    )
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("o", "open_site", "Open site", tooltip="Choose or type the site file"),
+        Binding("m", "mock", "Mock", tooltip="Start a mock machine with its tracker"),
+        Binding("c", "connect", "Connect", tooltip="Connect to the devices, or let them go"),
+        Binding("e", "power", "Drives", tooltip="Switch the drives' power"),
+        Binding("f", "clear_faults", "Clear faults", tooltip="Reset standing drive faults"),
+    ]
+
+    def body(self) -> ComposeResult:
+        """Site, controller and tracker; alarms beside or below them."""
+        with Horizontal(id="devices"):
+            with VerticalScroll(id="devices-state", can_focus=False):
+                yield Static(id="dev-site", classes="panel")
+                yield Static(id="dev-controller", classes="panel")
+                yield Static(id="dev-tracker", classes="panel")
+            with Vertical(id="devices-alarms"):
+                yield Static(id="dev-alarms", classes="panel")
+
+    def on_mount(self) -> None:
+        """Name the panels."""
+        for name, title in (
+            ("site", "Site"), ("controller", "Motion controller"),
+            ("tracker", "Laser tracker"), ("alarms", "Alarms"),
+        ):  # fmt: skip
+            self.query_one(f"#dev-{name}").border_title = title
+
+    def show(self, picture: Picture) -> None:
+        """Draw all panels."""
+        states, links = picture.states, picture.connected
+        self._put("site", site_text(self.desk.site, self.desk.mock is not None))
+        self._put(
+            "controller",
+            controller_text(links.get("controller"), states.controller if states else None),
+        )
+        self._put("tracker", tracker_text(links.get("tracker"), states.tracker if states else None))
+        self._put("alarms", alarms_text(picture, 1 if self.low else 30))
+        for role in ("controller", "tracker"):
+            link = links.get(role)
+            self.query_one(f"#dev-{role}").border_subtitle = link.address if link else ""
+
+    def _put(self, panel: str, text: Content) -> None:
+        self.query_one(f"#dev-{panel}", Static).update(text)
+
+    # keys
+
+    def action_open_site(self) -> None:
+        """Choose among the site files here, or type a path."""
+        found = [*site_candidates(Path()), ("", "another file: type its path")]
+
+        def opened(answer: str | None) -> None:
+            if answer:
+                self.act(lambda: self.desk.open_site(Path(answer).expanduser()))
+
+        def picked(answer: str | None) -> None:
+            if answer:
+                opened(answer)
+            elif answer == "":
+                self.app.push_screen(Enter("Open site", "Path of the site file"), opened)
+
+        if len(found) > 1:
+            self.app.push_screen(Pick("Open site", "Site files found here", found), picked)
+        else:
+            picked("")
+
+    def action_mock(self) -> None:
+        """Ask for the mock's arguments and start it."""
+        text = (
+            "A mock machine with its tracker starts as a process of its own and ends with this "
+            "program. Arguments as for pkmcal mock:"
+        )
+
+        def entered(answer: str | None) -> None:
+            if answer:
+                arguments = answer.split()
+                self.act(lambda: self._start(arguments), busy="starting a mock station ...")
+
+        self.app.push_screen(Enter("Start a mock", text, "hexapod --seed 7 --scale 20"), entered)
+
+    async def _start(self, arguments: list[str]) -> None:
+        await self.desk.start_mock(arguments)
+        await self.desk.connect()
+
+    def action_connect(self) -> None:
+        """Connect, or let go."""
+        if self.desk.connected:
+            self.act(self.desk.disconnect)
+        else:
+            self.act(self.desk.connect, busy="connecting ...")
+
+    def action_clear_faults(self) -> None:
+        """Reset drive faults."""
+        self.act(self.desk.clear_faults)
+
+    def action_power(self) -> None:
+        """Switch the drives; on is asked for, because the machine may twitch."""
+        states = self.desk.picture.states
+        if states is not None and states.controller is not None and states.controller.enabled:
+            self.act(lambda: self.desk.power(False))
+            return
+
+        def sure(answer: str | None) -> None:
+            if answer == "switch on":
+                self.act(lambda: self.desk.power(True))
+
+        self.app.push_screen(
+            Choose("Drives on?", "Nobody in the machine? The legs get power and may twitch.",
+                   ("switch on", "leave off")),
+            sure,
+        )  # fmt: skip
+
+
+def site_text(site: Site | None, mock: bool) -> Content:
+    """Say which site is open."""
+    if site is None:
+        return Content.from_markup(
+            "No site is open.  [bold $accent]o[/] opens a site file,  "
+            "[bold $accent]m[/] starts a mock machine."
+        )
+    who = "the mock" if site.hands.kind == "mock" else "you"
+    smrs = "one SMR" if site.hands.smrs == 1 else f"{site.hands.smrs} SMRs"
+    own = "  (started by this program)" if mock else ""
+    lines = [
+        f"{site.title or site.source}{own}   clock x{site.clock_scale:g}",
+        f"{site.machine.name}; nests {', '.join(site.platform_nests)}; base "
+        f"{', '.join(site.base_nests)}; {smrs}, carried by {who}",
+    ]
+    return Content("\n".join(lines))
+
+
+def identity_line(link: Connected | None) -> Content:
+    """Say who answers, or that nobody does."""
+    if link is None:
+        return Content.from_markup("[dim]○ not connected[/]")
+    who = link.identity
+    # A vendor that is only a number tells the operator nothing beside the product's name.
+    vendor = "" if who.product and who.vendor.startswith("0x") else who.vendor
+    names = " ".join(part for part in (vendor, who.product) if part) or who.kind
+    serial = f"   serial {who.serial}" if who.serial else ""
+    firmware = f"   firmware {who.firmware}" if who.firmware else ""
+    return Content.from_markup(
+        "[$success]●[/] [bold]$names[/]$rest", names=names, rest=serial + firmware
+    )
+
+
+def controller_text(link: Connected | None, state: ControllerState | None) -> Content:
+    """Identity, one line for each actuator, channels."""
+    lines = [identity_line(link)]
+    if link is not None and state is None:
+        lines.append(Content("no answer to the last question; see the alarms"))
+    if state is not None:
+        power = ("drives ON", "bold") if state.enabled else ("drives off", "")
+        motion = "moving" if state.moving else "standing"
+        channels = channel_text(state.channels)
+        lines.append(Content.assemble(power, f", {motion}   {channels}"))
+        lines.append(
+            Content.from_markup("[dim]actuator     position       target  homed  state[/]")
+        )
+        lines += [actuator_line(actuator) for actuator in state.actuators]
+    return Content("\n").join(lines)
+
+
+def actuator_line(actuator: ActuatorState) -> Content:
+    """One actuator's line."""
+    homed = "yes" if actuator.homed else "NO"
+    sign = "▶" if actuator.moving else " "
+    text = (
+        f"{actuator.name:<9}{sign}{actuator.position:>11.4f}  {actuator.target:>11.4f}  "
+        f"{homed:<5}  {actuator.state}"
+    )
+    if actuator.fault:
+        return Content.assemble(text, (f"  ✗ {actuator.fault}", "bold $error"))
+    return Content(text)
+
+
+def tracker_text(link: Connected | None, state: TrackerState | None) -> Content:
+    """Identity and flags."""
+    lines = [identity_line(link)]
+    if link is not None and state is None:
+        lines.append(Content("no answer to the last question; see the alarms"))
+    if state is not None:
+        flags = (
+            (state.initialized, "initialised", "not initialised"),
+            (state.laser_warm, "warm", "cold"),
+            (state.ready, "ready", "not ready"),
+            (state.locked, "beam locked", "no beam"),
+        )
+        signs = [
+            Content.from_markup("[$success]✓[/] $yes", yes=yes)
+            if flag
+            else Content.from_markup("[$warning]✗ $no[/]", no=no)
+            for flag, yes, no in flags
+        ]
+        signs.append(Content(f"{state.reflector or 'no reflector'}  face {state.face}"))
+        lines.append(Content("  ").join(signs))
+    return Content("\n").join(lines)
+
+
+def alarms_text(picture: Picture, most: int) -> Content:
+    """The latest alarms first."""
+    if not picture.alarms:
+        return Content.from_markup("[dim]no alarms[/]")
+    lines = []
+    for time_s, alarm in reversed(list(picture.alarms)[-most:]):
+        sign, style = ("✗", "bold $error") if alarm.fault else ("!", "$warning")
+        line = Content.assemble(
+            (f"{sign} {time_s:.0f} s ", style), (f"{alarm.device}: ", "bold"), alarm.what
+        )
+        lines.append(Content.assemble(line, f" → {alarm.remedy}") if alarm.remedy else line)
+    return Content("\n").join(lines)

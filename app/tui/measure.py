@@ -1,0 +1,205 @@
+"""Measure: the step list, what the machine and the tracker do now, the residuals growing."""
+
+import math
+from pathlib import Path
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal, Vertical
+from textual.content import Content
+from textual.widgets import Static
+
+from app.site import Site
+from app.tui.dialogs import Pick
+from app.tui.face import Face
+from app.tui.picture import Picture
+from app.tui.planning import NewRun, RunWish, plan_for
+from app.tui.widgets.plots import MissPlot, ScatterPlot
+from app.tui.widgets.steplist import StepList
+
+
+class MeasureFace(Face):
+    """Where the operator spends the day."""
+
+    mode = "measure"
+    label = "Measure"
+    about = (
+        "Choose a plan and start it (n). Left, the steps: the one in work is marked. Right, what "
+        "machine and tracker do now, and the distance of every reading from its prediction: it "
+        "should look like a cloud, not like a staircase. The job asks when an SMR is to be "
+        "carried. After a stop or a fault, g goes on where it ended: nothing is measured twice."
+    )
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("n", "new", "New run", tooltip="Choose poses and start measuring"),
+        Binding("space", "pause", "Pause", tooltip="Hold after the step in work, or go on"),
+        Binding("k", "skip", "Skip", tooltip="Leave the step in work out"),
+        Binding("g", "go_on", "Go on with", tooltip="Go on with a session that ended early"),
+    ]
+
+    def body(self) -> ComposeResult:
+        """Steps to the left, the present to the right."""
+        with Horizontal(id="measure"):
+            yield StepList(id="steps")
+            with Vertical(id="measure-right"):
+                yield Static(id="now", classes="panel")
+                yield MissPlot("Readings: distance from prediction, µm", id="miss")
+                yield ScatterPlot("Scatter while settling, µm", id="scatter")
+
+    def on_mount(self) -> None:
+        """Name the panel."""
+        self.query_one("#now").border_title = "Now"
+
+    def show(self, picture: Picture) -> None:
+        """Draw list, status and plots."""
+        steps = self.query_one(StepList)
+        steps.show(picture.steps, picture.current)
+        done = sum(step.state in ("done", "skipped") for step in picture.steps)
+        steps.border_subtitle = f"{done} of {len(picture.steps)}" if picture.steps else ""
+        self.query_one("#now", Static).update(now_text(picture, self.wide))
+        base = self.desk.site.base_nests if self.desk.site else ()
+        self.query_one(MissPlot).show(picture.points, base)
+        scatter = picture.scatter
+        if scatter:
+            self.query_one(ScatterPlot).show(
+                [each.std_mm for each in scatter], scatter[-1].limit_mm, picture.revision
+            )
+
+    # keys
+
+    def action_new(self) -> None:
+        """Choose what to measure and start."""
+        site = self.desk.site
+        if site is None or not self.desk.connected or self.desk.busy:
+            self.act(self._refuse)
+            return
+
+        def chosen(wish: RunWish | None) -> None:
+            if wish is not None:
+                self.act(lambda: self._measure(site, wish), busy="choosing poses ...")
+
+        self.app.push_screen(NewRun(site), chosen)
+
+    async def _refuse(self) -> None:
+        self.desk.check_idle("start a run")
+
+    async def _measure(self, site: Site, wish: RunWish) -> None:
+        await self.desk.run(await plan_for(site, wish))
+
+    def action_pause(self) -> None:
+        """Hold, or go on."""
+
+        async def toggle() -> None:
+            self.desk.pause_or_resume()
+
+        self.act(toggle)
+
+    def action_skip(self) -> None:
+        """Leave the step in work out."""
+
+        async def skip() -> None:
+            self.desk.skip()
+
+        self.act(skip)
+
+    def action_go_on(self) -> None:
+        """Choose among the sessions that can be gone on with."""
+        folders = unfinished(self.desk.root)
+        if not folders:
+            self.notify(f"No session in {self.desk.root} ended early.")
+            return
+
+        def picked(answer: str | None) -> None:
+            if answer:
+                self.act(lambda: self.desk.go_on(Path(answer)))
+
+        options = [(str(folder), folder.name) for folder in folders]
+        self.app.push_screen(Pick("Go on with", "Sessions, newest first", options), picked)
+
+
+def unfinished(root: Path) -> list[Path]:
+    """Sessions under ``root`` that have a journal but no exported run; newest first."""
+    return sorted(
+        (
+            journal.parent
+            for journal in root.glob("*/journal.sqlite")
+            if not (journal.parent / "run" / "run.toml").is_file()
+        ),
+        reverse=True,
+    )
+
+
+def now_text(picture: Picture, wide: bool) -> Content:
+    """Six lines that keep their places: step, pose, legs, scatter, reading, base and drift."""
+    if not picture.steps:
+        return Content.from_markup(
+            "No job.  [bold $accent]n[/] starts a new run,\n"
+            "[bold $accent]g[/] goes on with one that ended early."
+        )
+    rows = [
+        ("step", _step(picture)),
+        ("pose", _pose(picture, wide)),
+        ("legs", _legs(picture, wide)),
+        ("noise", _scatter(picture)),
+        ("read", _reading(picture)),
+        ("base", _base(picture)),
+    ]
+    return Content("\n").join(Content.assemble((f"{name:<6}", "dim"), text) for name, text in rows)
+
+
+def _step(picture: Picture) -> Content:
+    if picture.current is None:
+        return Content("-")
+    step = picture.steps[picture.current]
+    again = f"  (attempt {picture.attempt})" if picture.attempt > 1 else ""
+    return Content.assemble((step.says, "bold"), again)
+
+
+def _pose(picture: Picture, wide: bool) -> Content:
+    if picture.pose is None:
+        return Content("-")
+    x, y, z, *angles = picture.pose.pose
+    turns = [f"{math.degrees(angle):.{2 if wide else 0}f}" for angle in angles]
+    if wide:
+        return Content(f"{x:8.2f} {y:8.2f} {z:8.2f} mm   {'  '.join(turns)} deg")
+    return Content(f"{x:.1f} {y:.1f} {z:.1f} mm {' '.join(turns)}°")
+
+
+def _legs(picture: Picture, wide: bool) -> Content:
+    live = picture.live
+    q = live.q if live is not None else picture.pose.q if picture.pose is not None else None
+    if q is None:
+        return Content("-")
+    sign = "▶" if live is not None and live.moving else " "
+    return Content(sign + ("  " if wide else " ").join(f"{x:.{3 if wide else 1}f}" for x in q))
+
+
+def _scatter(picture: Picture) -> Content:
+    if not picture.scatter:
+        return Content("-")
+    last = picture.scatter[-1]
+    filled = min(8, round(8 * last.std_mm / last.limit_mm)) if last.limit_mm > 0 else 8
+    bar = "█" * filled + "░" * (8 - filled)
+    word = ("settled", "$success") if last.settled else ("settling", "$warning")
+    return Content.assemble(
+        f"{bar} {last.std_mm * 1000:.1f} of {last.limit_mm * 1000:.0f} µm  ", word
+    )
+
+
+def _reading(picture: Picture) -> Content:
+    last = picture.last_reading
+    if last is None:
+        return Content("-")
+    aside = f", {picture.rejected} set aside" if picture.rejected else ""
+    return Content(
+        f"nest {last.nest}: {last.miss_mm * 1000:.0f} µm off ± {last.sigma_mm * 1000:.0f}{aside}"
+    )
+
+
+def _base(picture: Picture) -> Content:
+    if picture.frame is None:
+        return Content("not found yet")
+    text = f"found, RMS {picture.frame.rms_mm * 1000:.1f}"
+    if picture.drift is not None:
+        text += f", drift {picture.drift.shift_mm * 1000:.1f}/{picture.drift.limit_mm * 1000:.0f}"
+    return Content(text + " µm")

@@ -1,0 +1,125 @@
+"""From what the operator wishes to measure to the plan: poses chosen or read, steps expanded."""
+
+import asyncio
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+from textual import on
+from textual.app import ComposeResult
+from textual.containers import Horizontal
+from textual.content import Content
+from textual.widgets import Button, Checkbox, Input, RadioButton, RadioSet, Static
+
+from app.pose_files import full_poses, read_pose_file
+from app.poses_file import read_poses
+from app.session import Plan, PlanOptions, measure_plan
+from app.session.plan import Pose
+from app.session.plans import Order
+from app.site import Site
+from app.tui.dialogs import Dialog
+from calib.arrays import Array
+from calib.poses import design_poses
+from calib.poses.readings import NestReadings
+
+SIGMA_MM = 0.005
+"""Uncertainty per axis that the choice of poses expects of a reading."""
+SEED = 1
+
+
+@dataclass(frozen=True)
+class RunWish:
+    """What to measure: ``poses`` is a number of poses to choose, or the path of a poses file."""
+
+    poses: str
+    order: Order
+    warm_up: bool
+
+
+async def plan_for(site: Site, wish: RunWish) -> Plan:
+    """Choose or read the poses and expand the plan; raises :class:`BadInput`."""
+    poses = await _poses(site, wish.poses)
+    options = PlanOptions(order=wish.order, warm_up=wish.warm_up)
+    return measure_plan(site, poses, options)
+
+
+async def _poses(site: Site, wish: str) -> dict[str, Pose]:
+    if wish.isdigit():
+        # A second of arithmetic: beside the event loop, so that the stop key stays alive.
+        return await asyncio.to_thread(_choose, site, int(wish))
+    path = Path(wish)
+    if path.suffix == ".csv":
+        return read_poses(path)
+    return read_pose_file(path, site.machine).by_label
+
+
+def _choose(site: Site, count: int) -> dict[str, Pose]:
+    readings = NestReadings(_matrix(site.platform_nests), SIGMA_MM, _matrix(site.base_nests))
+    design = design_poses(site.machine, readings, count, np.random.default_rng(SEED), counts=())
+    return full_poses(design.labels, design.pose_set)
+
+
+def _matrix(nests: Mapping[str, tuple[float, ...]]) -> Array:
+    """Nests as (3, M), mm."""
+    return np.array(list(nests.values()), float).T
+
+
+class Radio(RadioButton):
+    """A choice that shows by its sign, not only by its colour, whether it is taken."""
+
+    @property
+    def BUTTON_INNER(self) -> str:  # type: ignore[override]  # noqa: N802 - Textual's own name
+        """The sign between the brackets."""
+        return "●" if self.value else " "
+
+
+class Check(Checkbox):
+    """A box that is empty when it is not ticked."""
+
+    @property
+    def BUTTON_INNER(self) -> str:  # type: ignore[override]  # noqa: N802 - Textual's own name
+        """The sign between the brackets."""
+        return "X" if self.value else " "
+
+
+class NewRun(Dialog[RunWish]):
+    """The form for a new run."""
+
+    escape_says: ClassVar[str] = "tab: next field   enter: start   esc: close"
+
+    def __init__(self, site: Site) -> None:
+        super().__init__("New run")
+        self._enough = site.hands.smrs >= len(site.platform_nests)
+        self._nests = len(site.platform_nests)
+
+    def body(self) -> ComposeResult:
+        """Poses, order, warm-up, start."""
+        yield Static(
+            Content("How many poses (the most telling are chosen), or a poses file:"),
+            classes="form-label",
+        )
+        yield Input("29", id="poses", compact=True)
+        yield Static(Content("Order:"), classes="form-label")
+        with RadioSet(id="order", compact=True):
+            yield Radio(
+                "nest by nest: one SMR is carried, all poses with each nest", value=not self._enough
+            )
+            yield Radio(
+                f"pose by pose: an SMR in each of the {self._nests} nests", value=self._enough
+            )
+        yield Check("wait until temperatures are steady", True, id="warm-up", compact=True)
+        with Horizontal(classes="dialog-buttons"):
+            yield Button("Start", variant="success", id="start")
+
+    @on(Input.Submitted)
+    @on(Button.Pressed)
+    def _start(self) -> None:
+        poses = self.query_one("#poses", Input).value.strip()
+        if not poses:
+            self.notify("Give a number of poses, or the path of a poses file.")
+            return
+        pressed = self.query_one("#order", RadioSet).pressed_index
+        order: Order = "pose-by-pose" if pressed == 1 else "nest-by-nest"
+        self.dismiss(RunWish(poses, order, self.query_one("#warm-up", Checkbox).value))

@@ -1,0 +1,216 @@
+"""The terminal program: screens, the keys that work everywhere, and who puts errors up."""
+
+from collections.abc import Awaitable, Callable, Iterable
+from pathlib import Path
+from typing import Any, ClassVar
+
+from textual.app import App, SystemCommand
+from textual.binding import Binding, BindingType
+from textual.screen import Screen
+
+from app.errors import GateRefused, StoppedByOperator
+from app.tui.desk import POLL_S, Desk, said
+from app.tui.devices import DevicesFace
+from app.tui.dialogs import Ask, Choose, Help
+from app.tui.face import Face
+from app.tui.log import LogFace
+from app.tui.measure import MeasureFace
+from app.tui.theme import BENCH
+from app.tui.widgets.frame import STOP_KEY
+from calib.errors import BadInput
+from drivers.errors import DeviceError
+
+FACES: tuple[type[Face], ...] = (DevicesFace, MeasureFace, LogFace)
+FORESEEN = (BadInput, DeviceError, GateRefused, OSError)
+
+
+class Workbench(App[None]):
+    """The operator's screens."""
+
+    CSS_PATH = "pkmcal.tcss"
+    TITLE = "pkmcal"
+    MODES: ClassVar[dict[str, str | Callable[[], Screen[Any]]]] = {
+        face.mode: face for face in FACES
+    }
+    DEFAULT_MODE = FACES[0].mode
+    COMMAND_PALETTE_BINDING = "ctrl+p"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        # Priority: it also works in dialogs, in text lines and in the palette. It is one byte
+        # (0x18) in every terminal, so no multiplexer takes it for the start of something else.
+        Binding(STOP_KEY, "stop_all", "STOP", priority=True, show=False,
+                tooltip="Stop all motion and the job, at any moment"),
+        *(
+            Binding(str(number), f"show_face('{face.mode}')", face.label, show=False,
+                    tooltip=f"Show the screen {face.label}")
+            for number, face in enumerate(FACES, start=1)
+        ),
+        Binding("a", "answer", "Answer", show=False, tooltip="Answer what the job asks"),
+        Binding("b", "hide_banner", "Hide banner", show=False,
+                tooltip="Hide the banner; its text stays in the log"),
+        Binding("f1", "help", "Help", tooltip="What this screen is for, and its keys"),
+        Binding("ctrl+p", "command_palette", "Palette", tooltip="Find any action by its name"),
+        Binding("ctrl+q", "quit", "Quit", tooltip="Leave; asks if a job runs"),
+    ]  # fmt: skip
+
+    def __init__(self, site: Path | None = None, *, root: Path = Path("sessions")) -> None:
+        super().__init__()
+        self.desk = Desk(root)
+        self.tabs = tuple((face.mode, face.label) for face in FACES)
+        self._site = site
+        self._asked = ""
+
+    def on_mount(self) -> None:
+        """Open the site that the command line named, and begin to watch."""
+        self.register_theme(BENCH)
+        self.theme = BENCH.name
+        self.set_interval(0.1, self._watch_prompt)
+        self.run_worker(self._watch_devices(), group="poll", exit_on_error=True)
+        if self._site is not None:
+            site = self._site
+            self.act(lambda: self.desk.open_site(site))
+
+    async def _watch_devices(self) -> None:
+        from asyncio import sleep
+
+        while True:
+            try:
+                await self.desk.poll()
+            except FORESEEN as error:
+                self.put_up(error)
+            await sleep(POLL_S)
+
+    # actions and their errors
+
+    def act(self, what: Callable[[], Awaitable[Any]], *, busy: str = "") -> None:
+        """Run a coroutine beside the screen; what can be foreseen goes to the banner."""
+
+        async def guarded() -> None:
+            try:
+                await what()
+            except StoppedByOperator:
+                self.desk.picture.revision += 1  # its event has said so already
+            except FORESEEN as error:
+                self.put_up(error)
+
+        if busy:
+            self.desk.picture.write(busy)
+        self.run_worker(guarded(), group="act", exit_on_error=True)
+
+    def put_up(self, error: Exception) -> None:
+        """Put an error on the banner: what happened and what to do."""
+        what, remedy = said(error)
+        trouble = self.desk.picture.trouble
+        if trouble is None or trouble.what != what:
+            self.desk.picture.say_trouble(what, remedy)
+
+    # keys that work everywhere
+
+    def action_stop_all(self) -> None:
+        """Stop; never waits for anything else that runs here."""
+
+        async def stop() -> None:
+            words = await self.desk.stop()
+            self.desk.picture.write(f"STOP: {words}", "warn")
+            self.notify(words, title="STOP", severity="warning")
+
+        self.run_worker(stop(), group="stop", exit_on_error=True)
+
+    def action_show_face(self, mode: str) -> None:
+        """Change to another screen."""
+        self.switch_mode(mode)
+
+    def action_hide_banner(self) -> None:
+        """Take the banner away."""
+        self.desk.picture.trouble = None
+        self.desk.picture.revision += 1
+
+    def action_answer(self) -> None:
+        """Open the job's question again."""
+        if self.desk.picture.prompt is None:
+            self.notify("The job asks nothing.")
+        self._asked = ""
+
+    def action_help(self) -> None:
+        """Show what the screen is for and its keys."""
+        face = self.screen
+        if not isinstance(face, Face):
+            return
+        keys = [
+            (self.get_key_display(binding), binding.description, binding.tooltip)
+            for binding in bindings_of(type(face)) + bindings_of(type(self))
+        ]
+        self.push_screen(Help(f"Help: {face.label}", face.about, keys))
+
+    async def action_quit(self) -> None:
+        """Leave; a running job is asked for first."""
+        if not self.desk.busy:
+            await self.desk.close()
+            self.exit()
+            return
+
+        async def leave(answer: str | None) -> None:
+            if answer == "stop and leave":
+                await self.desk.close()
+                self.exit()
+
+        text = (
+            "A job is running. Leaving stops the machine and ends the job; nothing measured is "
+            "lost, and it can be gone on with later."
+        )
+        self.push_screen(Choose("Leave?", text, ("go on", "stop and leave")), leave)
+
+    # the job's questions
+
+    def _watch_prompt(self) -> None:
+        prompt = self.desk.picture.prompt
+        if prompt is None or prompt.prompt == self._asked or not isinstance(self.screen, Face):
+            return
+        self._asked = name = prompt.prompt
+
+        def asked_still() -> bool:
+            now = self.desk.picture.prompt
+            return now is not None and now.prompt == name
+
+        def answered(choice: str | None) -> None:
+            if choice is not None and asked_still():
+                self.desk.answer(name, choice)
+
+        self.push_screen(Ask(prompt, asked_still), answered)
+
+    # the palette
+
+    def get_system_commands(self, screen: Screen[Any]) -> Iterable[SystemCommand]:
+        """Offer every action of every screen, and Textual's own."""
+        for binding in bindings_of(type(self)):
+            if binding.action == "command_palette":
+                continue
+            action = binding.action
+            yield SystemCommand(
+                binding.description, f"{binding.tooltip} ({binding.key})",
+                lambda action=action: self.run_worker(self.run_action(action)),
+            )  # fmt: skip
+        for face in FACES:
+            for binding in bindings_of(face):
+                yield SystemCommand(
+                    f"{face.label}: {binding.description}",
+                    f"{binding.tooltip} ({self.get_key_display(binding)})",
+                    self._caller(face.mode, binding.action),
+                )
+        for command in super().get_system_commands(screen):
+            if command.title in ("Theme", "Screenshot"):
+                yield command
+
+    def _caller(self, mode: str, action: str) -> Callable[[], None]:
+        async def call() -> None:
+            await self.switch_mode(mode)
+            await self.run_action(action, self.screen)
+
+        def start() -> None:
+            self.run_worker(call())
+
+        return start
+
+
+def bindings_of(owner: type[Any]) -> list[Binding]:
+    """Every key that a screen or the program defines itself."""
+    return [binding for binding in owner.__dict__["BINDINGS"] if isinstance(binding, Binding)]

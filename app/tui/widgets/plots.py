@@ -1,0 +1,123 @@
+"""Plots that grow while the machine measures: decimated, redrawn only when there is news."""
+
+from collections.abc import Collection, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from textual_plot import HiResMode, PlotWidget
+
+from app.tui.picture import Point
+from app.tui.theme import BASE, SERIES
+
+MOST = 400
+"""More points than this cannot be told apart on a terminal."""
+
+Array = NDArray[np.float64]
+
+
+class QuietPlot(PlotWidget):
+    """A plot that leaves the keys to the screen and has small margins."""
+
+    def __init__(self, title: str, *, id: str) -> None:  # noqa: A002 - Textual's own name
+        super().__init__(id=id, allow_pan_and_zoom=False)
+        self.can_focus = False
+        self.border_title = title
+        self._drawn: object = None
+
+    def on_mount(self) -> None:
+        """Keep the margins small: a terminal has few lines."""
+        self.margin_left = 6
+        self.margin_bottom = 1
+        self.margin_top = 0
+
+    def changed(self, key: object) -> bool:
+        """Whether what is to be drawn differs from what is drawn."""
+        if key == self._drawn:
+            return False
+        self._drawn = key
+        return True
+
+
+class MissPlot(QuietPlot):
+    """Distance of each reading from its prediction, micrometres, over the reading's number."""
+
+    def show(self, points: Sequence[Point], base: Collection[str]) -> None:
+        """Draw the points; one marker for each platform nest, and one for all ``base`` nests."""
+        if not self.changed((len(points), points[-1].number if points else 0)):
+            return
+        self.clear()
+        if not points:
+            return
+        top = max(point.miss_mm for point in points) * 1000.0
+        self.set_xlimits(0, max(10, points[-1].number + 1))
+        self.set_ylimits(0, max(1.0, top * 1.08))
+        nests = sorted({point.nest for point in points} - set(base))
+        signs = []
+        for name, (marker, style) in zip(
+            [*nests, "base"], [*SERIES[: len(nests)], BASE], strict=False
+        ):
+            mine = [p for p in points if (p.nest in base if name == "base" else p.nest == name)]
+            x = np.array([float(point.number) for point in mine])
+            y = np.array([point.miss_mm * 1000.0 for point in mine])
+            x, y = thin(x, y, MOST // (len(nests) + 1))
+            self.scatter(x, y, marker=marker, marker_style=style)
+            if mine:
+                signs.append(f"{marker} {name}")
+        self.border_subtitle = f"nest  {'   '.join(signs)}"
+
+
+class ScatterPlot(QuietPlot):
+    """Scatter of the SMR in the settling window against its limit, micrometres, the last ones."""
+
+    def show(self, values_mm: Sequence[float], limit_mm: float, key: object) -> None:
+        """Draw the curve and the limit."""
+        if not self.changed(key):
+            return
+        self.clear()
+        self.set_xticks([])
+        if not values_mm:
+            return
+        x = np.arange(len(values_mm), dtype=float)
+        y = np.array(values_mm) * 1000.0
+        self.set_xlimits(0, max(20.0, x[-1]))
+        self.set_ylimits(0, max(float(y.max()), limit_mm * 1000.0) * 1.1)
+        self.plot(
+            np.array([0.0, max(20.0, x[-1])]),
+            np.full(2, limit_mm * 1000.0),
+            line_style="#7d8d9a",
+            hires_mode=HiResMode.BRAILLE,
+        )
+        self.plot(x, y, line_style="#6cb6d9", hires_mode=HiResMode.BRAILLE)
+
+
+class PairPlot(QuietPlot):
+    """Two or three series over one axis, as markers."""
+
+    def show(self, series: Mapping[str, tuple[Array, Array]], xlabel: str, key: object) -> None:
+        """Draw named series of x and y."""
+        if not self.changed(key):
+            return
+        self.clear()
+        drawn = {name: xy for name, xy in series.items() if len(xy[0])}
+        if not drawn:
+            return
+        tops = [float(np.nanmax(y)) for _, y in drawn.values()]
+        self.set_ylimits(0, max(1e-9, max(tops)) * 1.08)
+        for (x, y), (marker, style) in zip(drawn.values(), SERIES, strict=False):
+            thinned = thin(np.asarray(x, float), np.asarray(y, float), MOST)
+            self.scatter(*thinned, marker=marker, marker_style=style)
+        self.border_subtitle = "   ".join(
+            f"{marker} {name}" for name, (marker, _) in zip(drawn, SERIES, strict=False)
+        )
+
+
+def thin(x: Array, y: Array, most: int) -> tuple[Array, Array]:
+    """Keep at most ``most`` points: of each group of neighbours the largest, never an outlier lost.
+
+    ``x`` and ``y`` are (N,), in order.
+    """
+    if len(x) <= most:
+        return x, y
+    edges = np.linspace(0, len(x), most + 1).astype(int)
+    kept = np.array([lo + int(np.argmax(np.abs(y[lo:hi]))) for lo, hi in zip(edges, edges[1:])])  # noqa: B905, RUF007
+    return x[kept], y[kept]
