@@ -110,7 +110,7 @@ class Candidates:
         self.updates += 1
         A = self.rows[:, :, k]
         S = np.eye(self.m) + sign * self.G[:, :, k]
-        early = len(self.chosen) * self.m <= self.C.shape[0] // 2
+        early = len(self.chosen) * self.m <= 1.2 * self.C.shape[0]
         if early or self.updates >= REFRESH or np.linalg.eigvalsh(S)[0] < CRITICAL:
             # Where unknowns rest on the prior, before or after, differences of large numbers
             # would lose what is small.
@@ -188,6 +188,7 @@ def exchange(candidates: Candidates, rounds: int) -> int:
 
     The pose whose loss costs least is tried first. At most ``rounds`` removals are tried.
     """
+    candidates.refresh()
     swaps, settled = 0, set[int]()
     for _ in range(rounds):
         losses = candidates.losses()
