@@ -22,7 +22,7 @@ class ConsoleFace:
 
     def __init__(self, answer: Callable[[str, str], None], total: int, *, quiet: bool) -> None:
         self._answer = answer
-        self._console = Console(stderr=True, quiet=quiet, highlight=False)
+        self._console = Console(stderr=True, quiet=quiet, highlight=False, soft_wrap=True)
         self._progress = Progress(
             TextColumn("{task.completed:.0f}/{task.total:.0f}"),
             BarColumn(bar_width=24),

@@ -180,8 +180,12 @@ async def read_held(site: Site, controller: MotionController) -> Held:
     return Held(values, after)
 
 
-async def compare_with_known(site: Site, controller: MotionController) -> Held:
+async def compare_with_known(
+    site: Site, controller: MotionController, trial: Mapping[str, float] | None = None
+) -> Held:
     """Read the controller's parameters and refuse any that are not those expected.
+
+    ``trial`` is what a write-back has just put into volatile memory, to be tried.
 
     Raises
     ------
@@ -197,7 +201,7 @@ async def compare_with_known(site: Site, controller: MotionController) -> Held:
             remedy="Bring a known set back with pkmcal undo --to; motion is blocked until then",
         )
     held = await read_held(site, controller)
-    expected = snapshots.expected()
+    expected = Held(dict(trial), held.checksum) if trial else snapshots.expected()
     wanted = expected.values if expected else _nominal(site, held.values)
     different = [name for name in held.values if held.values[name] != wanted.get(name)]
     if different:

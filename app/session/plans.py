@@ -25,6 +25,10 @@ class PlanOptions:
     cycles: int = 1
     warm_up: bool = True
     two_face: bool = True
+    nests: tuple[str, ...] = ()
+    """Platform nests to use; all of the site's if empty."""
+    truth: bool = False
+    """Ask a mock's control socket for the true pose at each pose: for judges only."""
     title: str = ""
 
 
@@ -40,7 +44,9 @@ def measure_plan(
     """
     if not poses:
         raise BadInput("no poses to measure", remedy="Give a poses file with at least one pose")
-    nests = list(site.platform_nests)
+    nests = _nests(site, options)
+    if options.truth and site.hands.kind != "mock":
+        raise BadInput("only a mock machine knows the truth", remedy="Leave --truth out")
     if options.order == "pose-by-pose" and site.hands.smrs < len(nests):
         raise BadInput(
             f"pose by pose needs an SMR in each of the {len(nests)} platform nests, the site has "
@@ -88,7 +94,7 @@ def _nest_by_nest(
     plan: PlanWriter, site: Site, poses: Mapping[str, Pose], options: PlanOptions
 ) -> None:
     visited = 0
-    for nest in site.platform_nests:
+    for nest in _nests(site, options):
         plan.add("home", f"nest-{nest}", "home, for the SMR to be carried")
         plan.add("carry", nest, f"SMR into nest {nest}", nest=nest, smr=1)
         plan.add("confirm", nest, f"is it nest {nest} that the tracker sees?", nest=nest)
@@ -104,7 +110,7 @@ def _nest_by_nest(
 def _pose_by_pose(
     plan: PlanWriter, site: Site, poses: Mapping[str, Pose], options: PlanOptions
 ) -> None:
-    nests = list(site.platform_nests)
+    nests = _nests(site, options)
     plan.add("home", "carry", "home, for the SMRs to be carried")
     for smr, nest in enumerate(nests, start=1):
         plan.add("carry", nest, f"SMR {smr} into nest {nest}", nest=nest, smr=smr)
@@ -119,7 +125,23 @@ def _pose_by_pose(
             # Back and forth: the beam is already on the nest that was read last.
             for nest in nests if visited % 2 == 0 else reversed(nests):
                 _read(plan, label, nest, cycle, options)
+            if options.truth:
+                plan.add("truth", label, f"the mock's true pose at {label}", pose=label)
             visited += 1
+
+
+def _nests(site: Site, options: PlanOptions) -> list[str]:
+    """Platform nests that are used; raises BadInput for one that the site has not."""
+    for nest in options.nests:
+        if nest not in site.platform_nests:
+            raise BadInput(f'no platform nest "{nest}"', place=site.source)
+    return list(options.nests or site.platform_nests)
+
+
+def order_for(site: Site) -> Order:
+    """Pose by pose where there are SMRs enough, else nest by nest."""
+    enough = site.hands.smrs >= len(site.platform_nests)
+    return "pose-by-pose" if enough else "nest-by-nest"
 
 
 def _read(plan: PlanWriter, label: str, nest: str, cycle: int, options: PlanOptions) -> None:

@@ -17,7 +17,7 @@
 import asyncio
 import contextlib
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -77,12 +77,13 @@ class Session:
         journal: Journal,
         *,
         unattended: bool,
+        expected: Mapping[str, float] | None = None,
     ) -> None:
         self.folder = folder
         self.plan = plan
         self.station = station
         self.journal = journal
-        self.work = Work(station, plan, journal, unattended=unattended)
+        self.work = Work(station, plan, journal, unattended=unattended, expected=expected)
         self._states = journal.states()
         self._again = {s.id for s in plan.steps if s.kind in EVERY_TIME and s.id in self._states}
         self._going = asyncio.Event()
@@ -103,15 +104,27 @@ class Session:
         *,
         station: Station | None = None,
         unattended: bool = False,
+        expected: Mapping[str, float] | None = None,
     ) -> "Session":
-        """Begin a session in a new folder under ``root``: site, plan and journal are there."""
+        """Begin a session in a new folder under ``root``: site, plan and journal are there.
+
+        ``expected`` are the parameters that the controller should hold, where they are not those
+        that this program last left there for good (during a write-back).
+        """
         folder = _new_folder(root, f"{site.machine.name}-{plan.purpose}")
         (folder / "site.toml").write_text(site.to_toml(), encoding="utf-8")
         (folder / "plan.json").write_text(plan.to_json(), encoding="utf-8")
         journal = Journal(folder / "journal.sqlite")
         journal.enter_plan(plan)
         journal.set_meta("begun_utc", datetime.now(UTC).isoformat(timespec="seconds"))
-        return cls(folder, plan, station or Station(site), journal, unattended=unattended)
+        return cls(
+            folder,
+            plan,
+            station or Station(site),
+            journal,
+            unattended=unattended,
+            expected=expected,
+        )
 
     @classmethod
     def reopen(
@@ -212,6 +225,7 @@ class Session:
         """
         self.station.clock.start_at(self.journal.last_time())
         recall(self.work)
+        self.work.guarded = False
         leave = self.station.on_alarm(self._hear)
         self._driving = asyncio.create_task(self._drive(), name="engine")
         watch = asyncio.create_task(self._watch(), name="watch")
@@ -330,7 +344,8 @@ class Session:
         """Look for standing faults (heartbeat, link, drive) while steps run."""
         while True:
             await asyncio.sleep(_WATCH_S)
-            self.station.check()
+            if self.work.guarded:
+                self.station.check()
 
     async def _end(self, task: "asyncio.Task[None]") -> None:
         """Cancel a task and wait until it has ended; its own error is already known."""

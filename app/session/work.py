@@ -64,15 +64,26 @@ class StartOver(Exception):
 class Work:
     """One session's services, handed to each routine."""
 
-    def __init__(self, station: Station, plan: Plan, journal: Journal, *, unattended: bool) -> None:
+    def __init__(
+        self,
+        station: Station,
+        plan: Plan,
+        journal: Journal,
+        *,
+        unattended: bool,
+        expected: Mapping[str, float] | None = None,
+    ) -> None:
         self.station = station
         self.plan = plan
         self.journal = journal
         self.unattended = unattended
+        self.expected = expected
         self.clock = station.clock
         self.memory = Memory(Frame.of(station.site.tracker.frame))
         self.step = ""
         self.attempt = 0
+        self.guarded = False
+        """Whether standing faults end the session: from the moment when old ones are cleared."""
         self.losses = 0
         self.readings = sum(row.kind == "reading" for row in journal.rows())
         self._prompts: dict[str, tuple[tuple[str, ...], asyncio.Future[str]]] = {}

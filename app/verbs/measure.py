@@ -10,7 +10,7 @@ from app import answer
 from app.console import run_on_console, unattended
 from app.pose_files import read_any_poses
 from app.session import Outcome, PlanOptions, Session, measure_plan
-from app.session.plans import Order
+from app.session.plans import Order, order_for
 from app.site import load_site
 
 
@@ -37,7 +37,7 @@ def outcome_json(outcome: Outcome) -> dict[str, Any]:
     "poses_file",
     required=True,
     type=click.Path(path_type=Path),
-    help="Poses to visit (CSV; pkmcal poses chooses good ones).",
+    help="Poses to visit; pkmcal poses chooses good ones.",
 )
 @click.option(
     "--order",
@@ -89,10 +89,8 @@ def command(
     """
     site = load_site(site_file)
     poses = read_any_poses(poses_file, site.machine)
-    enough = site.hands.smrs >= len(site.platform_nests)
-    chosen = order or ("pose-by-pose" if enough else "nest-by-nest")
     options = PlanOptions(
-        order=cast(Order, chosen),
+        order=cast(Order, order) if order else order_for(site),
         reference_every=reference_every,
         cycles=cycles,
         warm_up=not no_warm_up,

@@ -9,6 +9,7 @@ from app.session.routines.moving import home, move
 from app.session.routines.preparing import check_path, connect, drives, rest, tracker, warm_up
 from app.session.routines.reading import read
 from app.session.routines.referencing import drift, reference, two_face
+from app.session.routines.truth import truth
 from app.session.work import Done, Work
 
 Routine = Callable[[Work, Step], Coroutine[Any, Any, Done]]
@@ -28,6 +29,7 @@ ROUTINES: dict[str, Routine] = {
     "drift": drift,
     "two-face": two_face,
     "rest": rest,
+    "truth": truth,
 }
 
 # Done again whenever a process takes a session over: what they check is not in the journal.

@@ -2,12 +2,13 @@
 
 import asyncio
 
+from app.errors import StoppedByOperator
 from app.session.known import compare_with_known
 from app.session.path import check_waypoints, waypoints
 from app.session.plan import Step
 from app.session.routines.moving import take_stock
 from app.session.work import Done, Work
-from drivers.errors import NotReady, Refused
+from drivers.errors import DeviceFault, NotReady, Refused
 
 _LOOK_S = 10.0
 """Machine seconds between two looks at the channels while warming up."""
@@ -24,8 +25,9 @@ async def connect(work: Work, step: Step) -> Done:
         If values are missing, not finite, or not those that this program last left there.
     """
     await work.station.connect()
-    work.station.check()
-    held = await compare_with_known(work.site, work.controller)
+    await _clear_old_faults(work)
+    work.guarded = True
+    held = await compare_with_known(work.site, work.controller, work.expected)
     work.memory.controller_parameters = dict(held.values)
     first = work.journal.meta("controller_parameters")
     if first is not None and first != held.values:
@@ -47,6 +49,18 @@ async def connect(work: Work, step: Step) -> Done:
     work.journal.set_meta("identities", identities)
     await take_stock(work)
     return Done(f"{len(held.values)} parameters as expected", {"checksum": held.checksum})
+
+
+async def _clear_old_faults(work: Work) -> None:
+    """Clear what stands from before, for example that the PC went away; the drives are off."""
+    try:
+        work.station.check()
+    except DeviceFault as fault:
+        text = f"A fault stands from before: {fault}. Clear it and go on?"
+        if await work.ask(text, ("clear", "stop"), "clear") == "stop":
+            raise StoppedByOperator(f"stopped because of a standing fault: {fault.what}") from None
+        await work.controller.clear_faults()
+        work.station.check()
 
 
 async def check_path(work: Work, step: Step) -> Done:
