@@ -1,0 +1,1 @@
+"""Diagnosis and discovery of what the model misses."""

@@ -1,0 +1,54 @@
+"""Tail probabilities of chi-square, fast for many values and exact where sf underflows."""
+
+import numpy as np
+from scipy import special, stats
+
+from calib.arrays import Array
+
+TABLE_END = 300.0
+"""Chi-square up to which values are interpolated in a table."""
+
+
+def log_tail(chi2: Array, dof: int) -> Array:
+    """log P(chi-square with ``dof`` degrees of freedom > chi2), to 1e-4; 0 for no freedom."""
+    if dof == 0:
+        return np.zeros_like(chi2)
+    end = TABLE_END + 2.0 * dof
+    roots = np.linspace(0.0, np.sqrt(end), 600)
+    table = stats.chi2.logsf(roots**2, dof)
+    answer = np.interp(np.sqrt(np.maximum(chi2, 0.0)), roots, table)
+    far = chi2 > end
+    if far.any():
+        answer[far] = _far_tail(chi2[far], dof)
+    return answer
+
+
+def _far_tail(chi2: Array, dof: int) -> Array:
+    """Far from the mean: Gamma(a, x) = x^(a-1) e^-x / (1 - (a-1)/(x - (a-3) - ...)), a = dof/2.
+
+    Lentz's continued fraction x + 1 - a - 1(1 - a)/(x + 3 - a - ...), Abramowitz & Stegun 6.5.31
+    in its even form, which converges within a few terms for x well above a.
+    """
+    a, x = 0.5 * dof, 0.5 * chi2
+    fraction = np.zeros_like(x)
+    for term in range(40, 0, -1):
+        fraction = term * (term - a) / (x + 2.0 * term + 1.0 - a - fraction)
+    return np.asarray(a * np.log(x) - x - special.gammaln(a) - np.log(x + 1.0 - a - fraction))
+
+
+def log_any(log_p: Array, trials: float) -> Array:
+    """log of the probability that one of ``trials`` independent looks reaches p: 1 - (1-p)^n."""
+    p = np.exp(np.minimum(log_p, -1e-12))
+    exact = np.log(np.maximum(-np.expm1(trials * np.log1p(-p)), 1e-320))
+    return np.where(log_p < -30.0, np.minimum(log_p + np.log(trials), 0.0), exact)
+
+
+def looks(levels: Array, quantile: float = 0.9) -> float:
+    """Effective number of independent looks behind maxima ``levels`` of -log p (draws,).
+
+    n such that P(max < level) = (1 - e^-level)^n at the given quantile; at least one.
+    """
+    p = float(np.exp(-np.quantile(levels, quantile)))
+    if p >= 1.0:
+        return 1.0
+    return max(1.0, float(np.log(quantile) / np.log1p(-p)))
