@@ -1,0 +1,1 @@
+"""Benches: figures for speed and for statistics that take longer than a test may."""
