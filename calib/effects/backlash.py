@@ -1,7 +1,15 @@
 """Lost motion: extension_i = -b_i/2 times the sign of the leg's last change."""
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown, limb_names, per_actuator
+from calib.effects.component import (
+    Effect,
+    Signature,
+    Situation,
+    Unknown,
+    alone,
+    limb_names,
+    per_actuator,
+)
 from calib.runs.stack import Rows
 
 
@@ -19,6 +27,10 @@ class Backlash(Effect):
             Unknown(f"backlash.{name}", a.unit, 0.02 if a.unit == "mm" else 1e-4)
             for name, a in zip(limb_names(rows.machine), rows.machine.actuators, strict=True)
         )
+
+    def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
+        """Each actuator alone."""
+        return alone(len(rows.machine.actuators))
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """Half a step against the direction of approach."""

@@ -23,6 +23,7 @@ import numpy as np
 
 from calib.arrays import Array
 from calib.mechanism.description import Machine
+from calib.mechanism.rigid import cross, rotate
 from calib.runs.stack import Rows
 
 Kind = Literal["machine", "measurement"]
@@ -78,6 +79,16 @@ class Situation:
     def machine(self) -> Machine:
         """The machine."""
         return self.rows.machine
+
+    @cached_property
+    def actuator_columns(self) -> Array:
+        """Whitened derivative (n, 3, N) of the readings by each extension."""
+        rows = self.rows
+        arm = self.base_point - self.position
+        moved = np.stack([twist[:3] + cross(twist[3:], arm) for twist in self.actuator_twists])
+        turned = np.stack([rotate(self.frame_rotation, one) for one in moved]) * rows.on_platform
+        columns: Array = np.einsum("ijn,ujn->uin", rows.whitener, turned)
+        return columns
 
     @cached_property
     def length(self) -> Array:
@@ -139,6 +150,10 @@ class Effect(ABC):
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """Name the unknowns."""
 
+    def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
+        """Groups of linear unknowns that may act alone (one leg); tested beside the whole."""
+        return ()
+
     def trials(self, rows: Rows) -> Iterator[tuple[float, ...]]:
         """Values of the nonlinear unknowns to be searched, in the order of the unknowns."""
         yield ()
@@ -160,6 +175,11 @@ def limb_names(machine: Machine) -> list[str]:
         ]
         names.append(driven[0] if len(set(driven)) == 1 else actuator.name)
     return names
+
+
+def alone(count: int, each: int = 1) -> tuple[tuple[int, ...], ...]:
+    """Parts of ``each`` successive unknowns: one leg, one nest or one axis alone."""
+    return tuple(tuple(range(each * k, each * k + each)) for k in range(count))
 
 
 def per_actuator(shape: Array) -> Array:

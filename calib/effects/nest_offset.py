@@ -3,7 +3,7 @@
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown
+from calib.effects.component import Effect, Signature, Situation, Unknown, alone
 from calib.runs.stack import Rows
 
 SIGMA_MM = 0.05
@@ -23,6 +23,10 @@ class NestOffset(Effect):
             for name in _nests(rows)
             for axis in "xyz"
         )
+
+    def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
+        """Each nest alone."""
+        return alone(len(_nests(rows)), 3)
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """A unit step of one nest along one platform axis."""

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown, limb_names
+from calib.effects.component import Effect, Signature, Situation, Unknown, alone, limb_names
 from calib.mechanism.description import Machine
 from calib.runs.stack import Rows
 
@@ -36,6 +36,10 @@ class ScrewCyclic(Effect):
         if _given_period(rows.machine) is not None:
             return waves
         return (*waves, Unknown("screw-cyclic.period", unit, 1.0, nonlinear=True))
+
+    def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
+        """Each actuator alone."""
+        return alone(len(rows.machine.actuators), 2)
 
     def trials(self, rows: Rows) -> Iterator[tuple[float, ...]]:
         """Equidistant frequencies, dense enough that none falls between two."""

@@ -1,7 +1,15 @@
 """Every screw has its own gain: extension_i = g_i s_i."""
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown, limb_names, per_actuator
+from calib.effects.component import (
+    Effect,
+    Signature,
+    Situation,
+    Unknown,
+    alone,
+    limb_names,
+    per_actuator,
+)
 from calib.runs.stack import Rows
 
 
@@ -15,6 +23,10 @@ class ScrewPitch(Effect):
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``screw-pitch.leg1`` ..., a ratio."""
         return tuple(Unknown(f"screw-pitch.{name}", "1", 1e-3) for name in limb_names(rows.machine))
+
+    def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
+        """Each actuator alone."""
+        return alone(len(rows.machine.actuators))
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """Commanded extension."""

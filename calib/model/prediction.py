@@ -304,8 +304,7 @@ def whitened_columns(signature: Signature, situation: Situation) -> Array:
     lever = _lever(combined, arm, rows.on_platform)
     if signature.extension is not None:
         shape = np.nan_to_num(signature.extension)
-        twists = _contract(shape, situation.actuator_twists)
-        total = total + _through(lever, twists)
+        total = total + _contract(shape, situation.actuator_columns)
     if signature.parameters is not None:
         twists = _contract(np.nan_to_num(signature.parameters), situation.parameter_twists)
         total = total + _through(lever, twists)
@@ -318,8 +317,8 @@ def whitened_columns(signature: Signature, situation: Situation) -> Array:
 
 
 def _contract(shape: Array, twists: Array) -> Array:
-    """Sum over actuators: (U, n, N) and (n, 6, N) -> (U, 6, N), skipping what is zero."""
-    out = np.zeros((shape.shape[0], 6, shape.shape[2]))
+    """Sum over the middle axis: (U, n, N) and (n, k, N) -> (U, k, N), skipping what is zero."""
+    out = np.zeros((shape.shape[0], *twists.shape[1:]))
     for unknown, actuator in zip(*np.nonzero(np.any(shape, axis=2)), strict=True):
         out[unknown] += shape[unknown, actuator] * twists[actuator]
     return out

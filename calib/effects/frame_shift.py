@@ -1,0 +1,79 @@
+"""The base reference or the tool changed at some moment of the run: a rigid step.
+
+Either all platform nests step in the platform frame (a tool touched), or the base frame steps in
+the tracker frame (base or tracker touched). The moment is searched between the readings.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from calib.arrays import Array
+from calib.effects.component import Effect, Signature, Situation, Unknown
+from calib.effects.tracker import rigid_motions
+from calib.mechanism.rigid import rotate
+from calib.runs.stack import Rows
+
+MOMENTS = 40
+"""Most moments that are tried."""
+EDGE = 0.06
+"""Part of the readings at either end in which a step cannot be told from bad readings."""
+
+
+class FrameShift(Effect):
+    """Three translations and three rotations; ``where`` is 0 for the platform, 1 for the base."""
+
+    id = "frame-shift"
+    kind = "measurement"
+    says = "the base reference or the tool changed at some moment of the run"
+
+    def unavailable(self, rows: Rows) -> str:
+        """Time must pass, and one run only: further runs have frames of their own anyway."""
+        if len(rows.runs) > 1:
+            return "several runs have frames of their own; look at one run alone"
+        return "" if len(_moments(rows)) > 0 else "all readings have the same time"
+
+    def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
+        """``frame-shift.x`` .. ``.rz``, mm and rad; ``.t0`` in s; ``.where``."""
+        moments = _moments(rows)
+        gap = float(np.median(np.diff(moments))) if len(moments) > 1 else 1.0
+        return (
+            *(Unknown(f"frame-shift.{axis}", "mm", 0.05) for axis in ("x", "y", "z")),
+            *(Unknown(f"frame-shift.{axis}", "rad", 1e-4) for axis in ("rx", "ry", "rz")),
+            Unknown("frame-shift.t0", "s", gap, sigma=gap, nonlinear=True),
+            Unknown("frame-shift.where", "1", 1.0, sigma=1e-6, nonlinear=True),
+        )
+
+    def trials(self, rows: Rows) -> Iterator[tuple[float, ...]]:
+        """Every moment, on the platform and on the base."""
+        for where in (0.0, 1.0):
+            for moment in _moments(rows):
+                yield (float(moment), where)
+
+    def signature(self, situation: Situation, values: Array) -> Signature:
+        """A rigid motion of everything read after the moment."""
+        rows = situation.rows
+        moment, where = values[6], values[7]
+        after = (rows.time_s >= moment).astype(np.float64)
+        shape = np.zeros((8, 3, rows.count))
+        if where > 0.5:
+            motions = rigid_motions(situation.base_point)
+            turned = [rotate(situation.frame_rotation, one) for one in motions]
+            shape[:6] = np.stack(turned) * after
+            return Signature(point=shape)
+        shape[:6] = rigid_motions(rows.nest) * after * rows.on_platform
+        return Signature(nest=shape)
+
+
+def _moments(rows: Rows) -> Array:
+    """Moments between successive readings, away from the ends of the run."""
+    times = np.sort(rows.time_s)
+    edge = max(2, int(EDGE * times.size))
+    inner = times[edge : times.size - edge]
+    between = 0.5 * (inner[1:] + inner[:-1])[np.diff(inner) > 0]
+    if between.size <= MOMENTS:
+        return between
+    return np.asarray(between[np.linspace(0, between.size - 1, MOMENTS).astype(int)])
+
+
+EFFECTS = (FrameShift(),)
