@@ -31,6 +31,7 @@ _TOKEN = re.compile(
     r"(?:\((?P<start>[^)]*)\))?"
     r"(?::(?P<value>\S+))?"
 )
+_AXISLESS = re.compile(r"(?:[A-Za-z]\w*=)?[RTUSC](?:\(.*)?(?::.*)?")
 _TERM = re.compile(
     r"([+-]?)(?:(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)\*)?([^+\-*]+(?:(?<=\d[eE])[+-]\d+[A-Za-z]*)?)"
 )
@@ -54,6 +55,12 @@ class ChainReader:
         """Append the elements of ``text``; raises :class:`BadInput` naming the token."""
         for token in text.split():
             found = _TOKEN.fullmatch(token)
+            if not found and _AXISLESS.fullmatch(token):
+                raise BadInput(
+                    f'"{token}" is a joint without an axis',
+                    place=self.place,
+                    remedy="Say about or along which local axis: Rx, Tz, Uxz, Sxyz.",
+                )
             if not found:
                 raise BadInput(
                     f'"{token}" is not an element of a chain',

@@ -170,6 +170,13 @@ def _twists(
     return out
 
 
+def passive_twists(closure: "Closure", limb: LinearLimbs) -> Numbers:
+    """Scaled twists (6, n_passive, L, N) of the passive coordinates of a group of limbs."""
+    columns = list(limb.group.passive_columns)
+    size = closure.machine.size
+    return _twists(limb.group, limb.screws, columns, closure.origin, size, closure.dtype)
+
+
 class Closure:
     """Everything that one linearisation of a machine's closure gives.
 

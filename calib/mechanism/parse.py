@@ -287,7 +287,7 @@ class _Reader:
         if symbol in declared:
             return self.parameter_term(f"{limb}.{symbol}", unit, place)
         bound = spec.get(symbol)
-        if isinstance(bound, str) and bound in names:
+        if isinstance(bound, str) and (bound in names or bound in self.index):
             symbol = bound
         elif isinstance(bound, str) and bound.isidentifier():
             raise self.fail(
@@ -344,17 +344,27 @@ class _Reader:
             )  # fmt: skip
 
     def check_references(self, limbs: tuple[Limb, ...]) -> None:
-        driven = {
-            term.index
-            for limb in limbs
-            for element in limb.elements
-            for term in element.terms
-            if term.kind == "actuator"
-        }
+        driven: dict[int, list[str]] = {}
+        for limb in limbs:
+            for element in limb.elements:
+                for term in element.terms:
+                    if term.kind == "actuator":
+                        driven.setdefault(term.index, []).append(limb.name)
+        twice = [
+            f"{self.actuators[i].name} drives {' and '.join(names)}"
+            for i, names in driven.items()
+            if len(names) > 1
+        ]
         for i, actuator in enumerate(self.actuators):
             keys = ("actuators", actuator.name)
             if i not in driven:
-                raise self.fail(f"actuator {actuator.name} drives no joint", *keys)
+                raise self.fail(
+                    f"actuator {actuator.name} drives no joint"
+                    + (f", while {'; '.join(twice)}" if twice else ""),
+                    *keys,
+                    remedy=f"Let a joint move by it: Ty:{actuator.name}, or q = "
+                    f'"{actuator.name}" in the table of its limb.',
+                )
             if isinstance(actuator.reference, str) and actuator.reference not in self.index:
                 raise self.fail(
                     f'"{actuator.reference}" is not a parameter', *keys,

@@ -24,6 +24,8 @@ CHUNK = 1024
 MAX_ITERATIONS = 60
 MAX_STEP = 0.4
 """Largest step, in rad for turns and as a part of the machine's size for lengths."""
+SETTLING = 12
+"""Steps in which limbs settle at the stated home before the machine is closed."""
 TOLERANCE = 1e-10
 """A step this small is the last: what is left after it is its square."""
 STAGNATION = 1e-8
@@ -300,11 +302,28 @@ def _start_state(machine: Machine, count: int, dtype: np.dtype[np.generic]) -> S
     )
 
 
+def settle_limbs(machine: Machine, extension: Array, state: State) -> None:
+    """Bring every limb's end as near to the platform as its passive joints can, platform held.
+
+    Rough joint angles (all zero, say) may be singular for the limbs together; after this they are
+    those of the stated pose. Changes ``state.passive``.
+    """
+    with np.errstate(all="ignore"):
+        for _ in range(SETTLING):
+            closure = Closure(machine, machine.nominal[:, None], extension, state)
+            for limb in closure.limbs:
+                step = limb.factors.solve_triangle(limb.factors.apply_transposed(limb.gap))
+                largest = np.max(np.abs(step) / limb.group.unit, axis=0, initial=1e-300)
+                step = step * np.minimum(1.0, MAX_STEP / largest)
+                state.passive[limb.group.passive] += np.where(np.isfinite(step), step, 0.0)
+
+
 @lru_cache(maxsize=64)
 def home_configuration(machine: Machine) -> Configuration:
     """The nominal machine closed at its home extensions; not converged if it cannot close."""
     extension = machine.extension(machine.home_q[:, None])
     state = _start_state(machine, 1, np.dtype(float))
+    settle_limbs(machine, extension, state)
     return _run(_Newton(machine, machine.nominal[:, None], extension, state, None, np.zeros(1)))
 
 
