@@ -4,6 +4,7 @@ from importlib import resources
 from pathlib import Path
 
 from calib.errors import BadInput
+from calib.mechanism.check import require_sound
 from calib.mechanism.description import Machine
 from calib.mechanism.parse import parse_machine
 
@@ -43,7 +44,10 @@ def load_machine(name_or_path: str, relative_to: Path | None = None) -> Machine:
             remedy=f"Shipped machines: {', '.join(shipped_machines())}; or give the path of a "
             "machine file",
         )
-    return parse_machine(read_text(path), str(path))
+    text = read_text(path)
+    machine = parse_machine(text, str(path))
+    require_sound(machine, text)
+    return machine
 
 
 def read_text(path: Path) -> str:
