@@ -21,9 +21,10 @@ _REMEDY = "Clear the line of sight, lock on the reflector and measure again."
 def fault_of(status: int, device: str) -> DeviceError:
     """The typed error for a status in the course of a measurement."""
     words = status_words(status)
+    if status == Status.NOT_INITIALIZED:
+        return NotReady(words, device=device, remedy="Initialise the tracker.")
     if status in _NOT_READY:
-        remedy = "Wait until it is warm and stable; initialise it if it is not initialised."
-        return NotReady(words, device=device, remedy=remedy)
+        return NotReady(words, device=device, remedy="Wait until it is warm and stable.")
     if status == Status.NO_STATIONARY_RESULT:
         remedy = "Let the machine settle, then measure again."
         return MeasurementError(words, device=device, remedy=remedy)

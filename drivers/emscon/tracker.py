@@ -27,7 +27,6 @@ from drivers.emscon.results import reading, samples
 from drivers.errors import BeamBroken, DeviceError, LinkLost, NoTarget, Refused, Silence
 from drivers.interface import Alarm, Identity, TrackerReading, TrackerState, TrackSample
 
-MARGIN_S = 3.0
 INITIALIZE_S = 90.0
 POINT_S = 60.0
 LONGEST_PACKET_GAP_S = 1.0
@@ -45,6 +44,8 @@ class EmsconSettings:
     environment: tuple[float, float, float] | None = None
     search_radius_mm: float = 20.0
     search_timeout_s: float = 20.0
+    margin_s: float = 3.0
+    """Wall seconds that an answer may take beyond the device's own time."""
 
 
 class EmsconTracker:
@@ -168,7 +169,7 @@ class EmsconTracker:
 
     async def reflectors(self) -> dict[str, int]:
         """Name and identifier of every reflector that the tracker knows."""
-        packets = await self._link.ask_many("GetReflectors", MARGIN_S)
+        packets = await self._link.ask_many("GetReflectors", self._settings.margin_s)
         known = [p for p in packets if p.integer("total") > 0]
         self._names = {p.integer("id"): p.text("name") for p in known}
         return {name: number for number, name in self._names.items()}
@@ -213,7 +214,7 @@ class EmsconTracker:
             measurement = self._measurement = Measurement(self._link.device)
             try:
                 await self._ask("StartMeasurement")
-                deadline = dwell_s / self._scale + MARGIN_S
+                deadline = dwell_s / self._scale + self._settings.margin_s
                 try:
                     async with asyncio.timeout(deadline):
                         return reading(await measurement.next(), self._link.device)
@@ -241,7 +242,7 @@ class EmsconTracker:
                 region_type=0,
             )
             measurement = self._measurement = Measurement(self._link.device)
-            gap = max(separation_s, LONGEST_PACKET_GAP_S) / self._scale + MARGIN_S
+            gap = max(separation_s, LONGEST_PACKET_GAP_S) / self._scale + self._settings.margin_s
             try:
                 await self._ask("StartMeasurement")
                 while True:
@@ -298,7 +299,9 @@ class EmsconTracker:
     async def _ask(self, name: str, device_s: float = 0.0, /, **values: wire.Value) -> wire.Packet:
         """Exchange that may take ``device_s`` of device time; statuses become typed errors."""
         try:
-            return await self._link.ask(name, device_s / self._scale + MARGIN_S, **values)
+            return await self._link.ask(
+                name, device_s / self._scale + self._settings.margin_s, **values
+            )
         except Refused as error:
             raise refusal(error, self._link.device) from error
 
