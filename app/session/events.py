@@ -261,26 +261,29 @@ class GateChecked(Event):
     says: str
 
 
+Stage = Literal[
+    "snapshot",
+    "compare",
+    "gates",
+    "disable",
+    "write",
+    "read-back",
+    "verify",
+    "confirm",
+    "store",
+    "reload",
+    "done",
+    "restore",
+    "restored",
+    "restore-failed",
+]
+
+
 @dataclass(frozen=True)
 class WriteBackStage(Event):
     """Where the write-back is."""
 
-    stage: Literal[
-        "snapshot",
-        "compare",
-        "gates",
-        "disable",
-        "write",
-        "read-back",
-        "verify",
-        "confirm",
-        "store",
-        "reload",
-        "done",
-        "restore",
-        "restored",
-        "restore-failed",
-    ]
+    stage: Stage
     says: str
 
 

@@ -19,6 +19,8 @@ from calib.poses.reach import PoseSet, reachable, rounded, solve_poses, workspac
 
 STEPS = 10
 """Halvings of the box's scale: it is found to a thousandth."""
+SPARE = 0.02
+"""Part of each stroke kept free at its ends: a calibrated machine needs other q for the grid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +119,10 @@ def verification_poses(machine: Machine) -> VerificationGrid:
 
     def fits(scale: float) -> bool:
         found = grid(scale)
-        return bool(np.all(reachable(machine, found.configuration)))
+        low, high = machine.q_limits.T[:, :, None]
+        spare = SPARE * (high - low)
+        inside = np.all((found.q >= low + spare) & (found.q <= high - spare))
+        return bool(inside and np.all(reachable(machine, found.configuration)))
 
     good, bad = 0.0, 1.0
     if fits(1.0):

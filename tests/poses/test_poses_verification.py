@@ -22,10 +22,10 @@ def test_hexapod_grid_is_27_nodes_by_8_orientations() -> None:
     assert len(nodes) == 27
     turns = {tuple(column) for column in np.round(grid.pose_set.task[3:].T, 9)}
     assert len(turns) == 8
-    # Nothing larger would do: a box one percent wider leaves the strokes.
+    # As large as can be, with 1.4 mm of each stroke spared for a calibrated machine's other q.
     assert 0.3 < grid.scale < 0.5
     q = grid.pose_set.q
-    assert min(q.min() - 195.0, 265.0 - q.max()) < 0.5
+    assert 1.4 <= min(q.min() - 195.0, 265.0 - q.max()) < 1.9
 
 
 def test_the_grid_closes_forward_where_it_was_asked() -> None:

@@ -1,0 +1,161 @@
+"""Write a fit to the controller: gates, trial, check poses, and only then keep"""
+
+import asyncio
+from pathlib import Path
+from typing import Any
+
+import click
+
+from app import answer
+from app.console import ConsoleFace, in_daemon_thread, stopping, unattended
+from app.fit_file import SavedFit, read_fit
+from app.session.station import Station
+from app.site import Site, load_site
+from app.verification import Summary
+from app.writeback.gates import LIMITS, Gates
+from app.writeback.procedure import Applied, WriteBack
+from app.writeback.proposal import Proposal
+from calib.errors import BadInput
+
+
+@click.command(
+    epilog="Gates and their limits: " + ", ".join(f"{k} {v:g}" for k, v in LIMITS.items())
+)
+@click.argument("fit_file", type=click.Path(path_type=Path))
+@click.option(
+    "--site", "site_file", required=True, type=click.Path(path_type=Path), help="Site file."
+)
+@click.option("--dry-run", is_flag=True, help="Show the table and the gates; write nothing.")
+@click.option("--yes", is_flag=True, help="Keep without asking, if every gate passes.")
+@click.option(
+    "--limit",
+    "limits",
+    multiple=True,
+    metavar="GATE=VALUE",
+    help="Change a gate's limit, knowingly (repeatable).",
+)
+@click.option("--unattended", "alone", is_flag=True, help="Nobody answers questions.")
+@click.option(
+    "--folder",
+    default="sessions",
+    type=click.Path(path_type=Path),
+    help="Where the sessions of the check poses get their folders.",
+)
+@answer.json_option
+def command(
+    fit_file: Path,
+    site_file: Path,
+    dry_run: bool,
+    yes: bool,
+    limits: tuple[str, ...],
+    alone: bool,
+    folder: Path,
+    as_json: bool,
+) -> None:
+    """Write what pkmcal fit --save found to the controller.
+
+    A snapshot is taken first. The new values go to volatile memory and are read back bit for bit;
+    check poses are measured before and after; only what passes every gate and is confirmed is
+    stored, loaded again and read back. Any failure brings the snapshot back. Effects of the
+    measurement are never written.
+    """
+    site = load_site(site_file)
+    fit = read_fit(fit_file)
+    gates = Gates.with_limits(dict(_limit(text) for text in limits))
+    done = asyncio.run(_apply(site, fit, gates, folder, dry_run, yes, alone, as_json))
+    answer.show(done[0], as_json, done[1])
+
+
+def _limit(text: str) -> tuple[str, float]:
+    gate, _, value = text.partition("=")
+    try:
+        return gate, float(value)
+    except ValueError:
+        raise BadInput(f'--limit "{text}"', remedy="Write GATE=NUMBER") from None
+
+
+async def _apply(
+    site: Site,
+    fit: SavedFit,
+    gates: Gates,
+    folder: Path,
+    dry_run: bool,
+    yes: bool,
+    alone: bool,
+    quiet: bool,
+) -> tuple[dict[str, Any], str]:
+    station = Station(site)
+    alone = unattended(alone)
+
+    async def confirm(proposal: Proposal, before: Summary, after: Summary) -> bool:
+        if yes:
+            return True
+        if alone:
+            return False
+        answer.say(table(proposal))
+        text = (
+            f"Check poses: peak {before.position_peak_um:.1f} um before, "
+            f"{after.position_peak_um:.1f} um now. Keep these parameters?"
+        )
+        given = await in_daemon_thread(lambda: "y" if click.confirm(text, err=True) else "n")
+        return given == "y"
+
+    job = WriteBack(station, fit, gates, folder, confirm, alone)
+
+    def reply(prompt: str, choice: str) -> None:
+        if job.running is not None:
+            job.running.answer_prompt(prompt, choice)
+
+    face = ConsoleFace(reply, 0, quiet=quiet)
+    leave = station.observers.watch(face.hear)
+    try:
+        with face.shown(), stopping(job.stop):
+            await station.connect()
+            if dry_run:
+                _, proposal = await job.propose()
+                return _json(proposal, None), table(proposal) + "\nnothing was written"
+            applied = await job.run()
+    finally:
+        leave()
+        await station.close()
+    return _json(applied.proposal, applied), table(applied.proposal) + "\n" + _words(applied)
+
+
+def _json(proposal: Proposal, applied: Applied | None) -> dict[str, Any]:
+    return {
+        "format": "pkm-apply/1",
+        "written": applied is not None,
+        "changes": [{**vars(c), "in_sigmas": c.in_sigmas} for c in proposal.changes],
+        "left_out": dict(proposal.left_out),
+        "snapshot": applied and applied.snapshot.number,
+        "kept": applied and applied.kept.number,
+        "check_before": applied and vars(applied.before),
+        "check_after": applied and vars(applied.after),
+        "noise_peak_um": applied and applied.noise_peak_um,
+    }
+
+
+def table(proposal: Proposal) -> str:
+    """Old, new and difference of every parameter; then what is left out, and why."""
+    rows = [
+        (
+            c.name, f"{c.old:.5f}", f"{c.new:.5f}", f"{c.new - c.old:+.5f}", f"{c.sigma:.5f}",
+            f"{c.in_sigmas:+.1f}", c.unit, "" if c.identified else "mostly its tolerance",
+        )
+        for c in proposal.changes
+        if c.old != c.new
+    ]  # fmt: skip
+    head = ("parameter", "old", "new", "change", "sigma", "in sigmas", "unit", "")
+    lines = [answer.table(head, rows)] if rows else ["nothing to change"]
+    lines += [f"not written: {name}: {why}" for name, why in proposal.left_out.items()]
+    return "\n".join(lines)
+
+
+def _words(applied: Applied) -> str:
+    return (
+        f"check poses: peak {applied.before.position_peak_um:.1f} um before, "
+        f"{applied.after.position_peak_um:.1f} um after (tracker noise alone: "
+        f"{applied.noise_peak_um:.1f} um)\n"
+        f"kept as set {applied.kept.number}; the way back: "
+        f"pkmcal undo --to {applied.snapshot.number}"
+    )

@@ -1,0 +1,243 @@
+"""The whole write-back: snapshot, gates, trial in volatile memory, check poses, and only then keep.
+
+Whatever fails on the way, the set that was there before is brought back and read back; if that
+fails as well, the parameters are unknown and motion stays blocked until a known set is back.
+"""
+
+import asyncio
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from app.errors import GateRefused
+from app.fit_file import SavedFit
+from app.session.events import Stage, WriteBackStage
+from app.session.known import Held, Snapshot, compare_with_known
+from app.session.plan import Pose
+from app.session.plans import PlanOptions, measure_plan, order_for
+from app.session.session import Session
+from app.session.station import Station
+from app.verification import Summary, Verification, judge
+from app.writeback.gates import Gates, gates_of_check, gates_of_proposal, refuse_if_any
+from app.writeback.proposal import Proposal, propose
+from app.writeback.transfer import keep, prove, snapshots_of, write_volatile
+from calib.poses import verification_poses
+from drivers.errors import DeviceError, ParameterError
+
+CHECK_POSES = 8
+Confirm = Callable[[Proposal, Summary, Summary], Awaitable[bool]]
+
+
+@dataclass(frozen=True)
+class Applied:
+    """What a write-back did: the way back is ``snapshot``."""
+
+    snapshot: Snapshot
+    kept: Snapshot
+    proposal: Proposal
+    before: Summary
+    after: Summary
+    noise_peak_um: float
+
+
+@dataclass
+class WriteBack:
+    """One write-back on a connected station.
+
+    Parameters
+    ----------
+    station : Station
+    fit : SavedFit
+    gates : Gates
+    root : Path
+        Where the sessions of the check poses get their folders.
+    confirm : coroutine function
+        Asks the person: proposal, check poses before and after -> keep it?
+    unattended : bool
+        As for :class:`Session`.
+    poses : mapping, optional
+        Check poses, not among the fitted ones; eight of the verification grid by default.
+    """
+
+    station: Station
+    fit: SavedFit
+    gates: Gates
+    root: Path
+    confirm: Confirm
+    unattended: bool = False
+    poses: Mapping[str, Pose] = field(default_factory=dict)
+    running: Session | None = None
+    """The session that measures check poses at this moment."""
+
+    async def propose(self) -> tuple[Held, Proposal]:
+        """Read the controller, compare with the fit, and judge; nothing is written.
+
+        Raises
+        ------
+        GateRefused
+            Naming every gate that did not pass.
+        ParameterError
+            If the controller does not hold what is known.
+        """
+        site = self.station.site
+        held = await compare_with_known(site, self.station.controller)
+        proposal = propose(site.machine, self.fit, held.values)
+        checked = gates_of_proposal(self.gates, site.machine, self.fit, proposal, held.values)
+        for gate in checked:
+            self.station.observers.tell(gate)
+        refuse_if_any(checked, "Nothing was written. Measure more, or fit again")
+        return held, proposal
+
+    async def run(self) -> Applied:
+        """Write, try, and keep; or put everything back.
+
+        Raises
+        ------
+        GateRefused
+            If a gate or the person said no; the earlier set is back.
+        DeviceError
+            If something broke; the message says whether the earlier set is back.
+        StoppedByOperator
+            If the operator stopped; the earlier set is back.
+        """
+        held, proposal = await self.propose()
+        snapshots = snapshots_of(self.station)
+        snapshot = snapshots.save(held, f"before applying {Path(self.fit.source).name}")
+        self._stage("snapshot", f"{len(held.values)} parameters in {snapshots.path(snapshot)}")
+        before = await self._measure("before", held.values)
+        after = before
+        wanted = {**held.values, **proposal.values}
+        try:
+            self._stage("write", f"{len(proposal.changes)} values into volatile memory")
+            await write_volatile(self.station, wanted)
+            self._stage("read-back", "every value reads back bit for bit")
+            after = await self._measure("after", wanted)
+            checked = gates_of_check(
+                self.gates, before.measured, after.measured, after.noise_peak_um
+            )
+            for gate in checked:
+                self.station.observers.tell(gate)
+            refuse_if_any(checked, "The fit does not hold on poses that it had not seen")
+            if not await self.confirm(proposal, before.measured, after.measured):
+                raise GateRefused("the operator did not confirm")
+            self._stage("store", "into memory that survives a power cycle")
+            kept_set = await keep(self.station, wanted)
+            self._stage("reload", "loaded again and read back bit for bit")
+        except (Exception, asyncio.CancelledError) as error:
+            await self._restore(snapshot, error)
+            raise
+        kept = snapshots.save(kept_set, f"applied {Path(self.fit.source).name}")
+        snapshots.expect(kept_set)
+        self._stage("done", f"kept as set {kept.number}; the way back: undo --to {snapshot.number}")
+        return Applied(
+            snapshot, kept, proposal, before.measured, after.measured, after.noise_peak_um
+        )
+
+    async def stop(self) -> None:
+        """Stop a measurement of check poses; :meth:`run` then restores and ends."""
+        if self.running is not None:
+            await self.running.stop()
+
+    async def _measure(self, when: str, expected: Mapping[str, float]) -> Verification:
+        """Measure the check poses with the parameters that the controller holds now."""
+        site = self.station.site
+        self._stage("verify", f"check poses {when} writing")
+        options = PlanOptions(
+            order=order_for(site),
+            warm_up=False,
+            two_face=False,
+            title=f"check poses {when} writing",
+        )
+        plan = measure_plan(site, self.poses or check_poses(self.station), options, "check")
+        session = Session.create(
+            site,
+            plan,
+            self.root,
+            station=self.station,
+            unattended=self.unattended,
+            expected=expected,
+        )
+        self.running = session
+        try:
+            await session.run()
+            return judge(site, plan, session.journal)
+        finally:
+            self.running = None
+            session.journal.close()
+
+    async def _restore(self, snapshot: Snapshot, why: BaseException) -> None:
+        """Bring the earlier set back after a failure; a second failure latches "unknown"."""
+        self._stage("restore", f"set {snapshot.number}, because: {why or 'stopped'}")
+        try:
+            await asyncio.shield(_put_back(self.station, snapshot))
+        except (DeviceError, OSError) as again:
+            reason = f"restoring set {snapshot.number} failed: {again}"
+            snapshots_of(self.station).latch_unknown(reason)
+            self._stage("restore-failed", reason)
+            raise ParameterError(
+                f"its parameters are unknown. First: {why or 'stopped'}. Then: {reason}",
+                device="controller",
+                remedy=f"Do not move the machine. When it answers: pkmcal undo --to "
+                f"{snapshot.number}",
+            ) from why
+        self._stage("restored", f"set {snapshot.number} is back, read back bit for bit")
+
+    def _stage(self, stage: Stage, says: str) -> None:
+        self.station.observers.tell(WriteBackStage(stage, says))
+
+
+async def _put_back(station: Station, snapshot: Snapshot) -> None:
+    """Write a snapshot for good: what failed may have come after the new set was stored."""
+    await station.safe_stop()
+    await write_volatile(station, snapshot.values)
+    await keep(station, snapshot.values)
+
+
+async def undo(station: Station, snapshot: Snapshot, why: str) -> Snapshot:
+    """Bring an earlier set back, for good; returns the set as it is now kept.
+
+    What the controller holds is saved first, where it can be read at all. Clears the latch of
+    unknown parameters.
+
+    Raises
+    ------
+    ParameterError
+        If the set does not read back; the parameters are then unknown, and motion blocked.
+    """
+    snapshots = snapshots_of(station)
+    tell = station.observers.tell
+    try:
+        now = await prove(station, {}, "before undoing")
+        saved = snapshots.save(now, f"before {why}")
+        tell(WriteBackStage("snapshot", f"what it holds now is set {saved.number}"))
+    except ParameterError as error:
+        tell(WriteBackStage("snapshot", f"what it holds cannot be saved: {error.what}"))
+    try:
+        tell(WriteBackStage("write", f"set {snapshot.number}"))
+        await write_volatile(station, snapshot.values)
+        tell(WriteBackStage("store", "into memory that survives a power cycle"))
+        kept = await keep(station, snapshot.values)
+    except DeviceError as error:
+        snapshots.latch_unknown(f"undo to set {snapshot.number} failed: {error.what}")
+        raise
+    snapshots.expect(kept)
+    tell(WriteBackStage("done", f"set {snapshot.number} is back, read back bit for bit"))
+    return snapshot
+
+
+async def accept(station: Station) -> Snapshot:
+    """Take what the controller holds as known, knowingly."""
+    snapshots = snapshots_of(station)
+    held = await prove(station, {}, "to accept it")
+    saved = snapshots.save(held, "accepted as it was found")
+    snapshots.expect(held)
+    return saved
+
+
+def check_poses(station: Station) -> dict[str, Pose]:
+    """Eight poses of the verification grid, spread over nodes and orientations."""
+    grid = verification_poses(station.site.machine).by_label
+    labels = list(grid)
+    stride = max(len(labels) // CHECK_POSES, 1)
+    chosen = [labels[k * stride + k % stride] for k in range(min(CHECK_POSES, len(labels)))]
+    return {label: grid[label] for label in chosen}

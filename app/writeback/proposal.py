@@ -1,0 +1,125 @@
+"""What a fit would write to a controller, what it would not, and why not.
+
+Effects of the *measurement* are never written. Of the machine effects a controller can take those
+for which it has compensation values; a value that it holds already is added to, since what was
+fitted is what was left.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from app.fit_file import SavedFit
+from calib.effects import effect_named
+from calib.errors import BadInput
+from calib.mechanism.description import Machine
+
+
+@dataclass(frozen=True)
+class Change:
+    """One parameter: ``old`` in the controller, ``new`` proposed, ``sigma`` of the estimate."""
+
+    name: str
+    old: float
+    new: float
+    sigma: float
+    unit: str
+    identified: bool
+
+    @property
+    def in_sigmas(self) -> float:
+        """Difference in standard uncertainties of the estimate; nan where there is none."""
+        return (self.new - self.old) / self.sigma if self.sigma > 0.0 else math.nan
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """All changes, and what the fit found that is not written: name -> why."""
+
+    changes: tuple[Change, ...]
+    left_out: Mapping[str, str]
+
+    @property
+    def values(self) -> dict[str, float]:
+        """What would be written."""
+        return {change.name: change.new for change in self.changes}
+
+
+def propose(machine: Machine, fit: SavedFit, held: Mapping[str, float]) -> Proposal:
+    """Compare a fit with what the controller holds.
+
+    Raises
+    ------
+    BadInput
+        If the fit is of another machine, or lacks a parameter of this one.
+    """
+    if fit.machine and fit.machine not in (machine.name, machine.source):
+        raise BadInput(
+            f'a fit of the machine "{fit.machine}", the site has "{machine.name}"',
+            place=fit.source,
+            remedy="Fit runs of this machine",
+        )
+    missing = [p.name for p in machine.parameters if p.name not in fit.estimates]
+    if missing:
+        raise BadInput(
+            f"{len(missing)} parameters are not in the fit, the first is {missing[0]}",
+            place=fit.source,
+            remedy="Fit all parameters together: they are correlated",
+        )
+    changes = [_change(fit, p.name, held, 0.0) for p in machine.parameters]
+    left_out: dict[str, str] = {}
+    for effect in fit.effects:
+        found = [name for name in fit.estimates if name.startswith(f"{effect}.")]
+        if not _of_the_machine(effect, machine):
+            left_out[effect] = "no effect of the machine that is known here; never written"
+        elif effect == "screw-cyclic":
+            changes += _cyclic(fit, held, left_out)
+        elif found and all(name in held for name in found):
+            changes += [_change(fit, name, held, held[name]) for name in found]
+        else:
+            left_out[effect] = "the controller has no compensation for it"
+    return Proposal(tuple(changes), left_out)
+
+
+def _of_the_machine(effect: str, machine: Machine) -> bool:
+    """Whether an effect is known to belong to the machine; an operator's own one is not."""
+    try:
+        return effect_named(effect, machine).kind == "machine"
+    except BadInput:
+        return False
+
+
+def _change(fit: SavedFit, name: str, held: Mapping[str, float], add_to: float) -> Change:
+    found = fit.estimates[name]
+    new = found.value + add_to
+    if name.startswith("backlash."):
+        new = max(new, 0.0)  # lost motion is never negative; below zero it is noise
+    return Change(name, held[name], new, found.sigma, found.unit, found.identified)
+
+
+def _cyclic(fit: SavedFit, held: Mapping[str, float], left_out: dict[str, str]) -> list[Change]:
+    """Turn A sin(2 pi s / p) + B cos(2 pi s / p) into the controller's table of each actuator."""
+    effect = "screw-cyclic"
+    period = fit.estimates.get(f"{effect}.period")
+    legs = [n.split(".")[1] for n in fit.estimates if n.startswith(effect) and n.endswith(".sin")]
+    changes: list[Change] = []
+    for leg in legs:
+        table = f"{effect}-table.{leg}"
+        count = sum(n.startswith(f"{table}.") and n != f"{table}.period" for n in held)
+        if period is None or not count:
+            left_out[effect] = "the controller has no cyclic table"
+            return []
+        if held[f"{table}.period"] != 0.0:
+            left_out[effect] = "the controller's cyclic table is in use; undo it first"
+            return []
+        sine, cosine = (fit.estimates[f"{effect}.{leg}.{part}"] for part in ("sin", "cos"))
+        sigma = math.hypot(sine.sigma, cosine.sigma)
+        changes.append(
+            Change(f"{table}.period", 0.0, period.value, period.sigma, period.unit, True)
+        )
+        for k in range(count):
+            turn = 2.0 * math.pi * k / count
+            new = sine.value * math.sin(turn) + cosine.value * math.cos(turn)
+            name = f"{table}.{k}"
+            changes.append(Change(name, held[name], new, sigma, sine.unit, sine.identified))
+    return changes
