@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from calib.arrays import Array
+from calib.arrays import Array, BoolArray
 from calib.identify.fitting import Fit
+from calib.runs.stack import Rows
 
 
 @dataclass(frozen=True)
@@ -29,26 +30,49 @@ def hold_out(fit: Fit) -> HoldOut:
     The floor is sqrt(mean tr(Sigma + J C J^T)) with C the covariance of the fold's fit. Answers
     nan if there are fewer than two poses.
     """
-    rows, jacobian = fit.model.rows, fit.linear.jacobian
-    normal = fit.jacobian @ fit.jacobian.T + np.diag(fit.prior_precision)
-    slope = fit.jacobian @ fit.whitened - fit.prior_precision * fit.model.deviation(
-        fit.linear.state
+    pull = fit.prior_precision * fit.model.deviation(fit.linear.state)
+    linear = fit.linear
+    return hold_out_of(
+        fit.model.rows, fit.accepted, linear.whitened, linear.jacobian, fit.prior_precision, pull
     )
+
+
+def hold_out_of(
+    rows: Rows,
+    accepted: BoolArray,
+    whitened: Array,
+    jacobian: Array,
+    precision: Array,
+    pull: Array,
+) -> HoldOut:
+    """Hold-out of any linearised model of these readings.
+
+    Parameters
+    ----------
+    whitened, jacobian : (3, N), (p, 3, N)
+        Residuals and derivatives in sigmas, near the optimum.
+    precision, pull : (p,)
+        1 / sigma^2 of the priors, and that times the distance from their means.
+    """
+    chosen = jacobian[:, :, accepted].reshape(jacobian.shape[0], -1)
+    normal = chosen @ chosen.T + np.diag(precision)
+    slope = chosen @ whitened[:, accepted].reshape(-1) - pull
     scale = 1.0 / np.sqrt(np.diag(normal))
+    factors = np.linalg.inv(np.moveaxis(rows.whitener, -1, 0))
     squares, floor, count = 0.0, 0.0, 0
     for fold in np.unique(rows.fold[rows.fold >= 0]):
-        held = (rows.fold == fold) & fit.accepted
-        if not held.any() or held.sum() == fit.accepted.sum():
+        held = (rows.fold == fold) & accepted
+        if not held.any() or held.sum() == accepted.sum():
             continue
-        block = jacobian[:, :, held].reshape(jacobian.shape[0], -1)
+        own = jacobian[:, :, held]
+        block = own.reshape(own.shape[0], -1)
         inverse = _inverse(normal - block @ block.T, scale)
-        step = inverse @ (slope - block @ fit.linear.whitened[:, held].reshape(-1))
-        own = _to_mm(rows.whitener[:, :, held], jacobian[:, :, held])
-        residual = fit.linear.residual[:, held] - np.tensordot(step, own, axes=1)
-        flat = own.reshape(own.shape[0], -1)
-        squares += float(np.sum(residual**2))
+        step = inverse @ (slope - block @ whitened[:, held].reshape(-1))
+        off = whitened[:, held] - np.tensordot(step, own, axes=1)
+        squares += float(np.sum(np.einsum("nij,jn->in", factors[held], off) ** 2))
         floor += float(np.einsum("iin->", rows.covariance[:, :, held]))
-        floor += float(np.sum(flat * (inverse @ flat)))
+        natural = np.einsum("nij,pjn->pin", factors[held], own).reshape(own.shape[0], -1)
+        floor += float(np.sum(natural * (inverse @ natural)))
         count += int(held.sum())
     if count == 0:
         return HoldOut(float("nan"), float("nan"), 0)
@@ -59,9 +83,3 @@ def _inverse(normal: Array, scale: Array) -> Array:
     factor = linalg.cho_factor(normal * scale[:, None] * scale, lower=True)
     inverse: Array = linalg.cho_solve(factor, np.eye(scale.size))
     return inverse * scale[:, None] * scale
-
-
-def _to_mm(whitener: Array, jacobian: Array) -> Array:
-    factors = np.linalg.inv(np.moveaxis(whitener, -1, 0))
-    answer: Array = np.einsum("nij,pjn->pin", factors, jacobian)
-    return answer

@@ -25,6 +25,10 @@ from calib.mechanism.rigid import cross, exponential, product, rotate
 from calib.mechanism.solve import Configuration, forward, home_configuration
 from calib.runs.stack import Rows
 
+SETTLING_PASSES = 4
+SETTLED = 1e-8
+"""Change of extension, mm or rad, below which effects and pose agree."""
+
 
 @dataclass(frozen=True, eq=False)
 class State:
@@ -152,8 +156,11 @@ class Model:
         return self._closed(self.rows.extension[:, first], self.machine.nominal, None)
 
     def start(self, rotation: Array, position: Array) -> State:
-        """Nominal parameters, no effect, given frames (3, 3, K), (3, K)."""
-        effects = tuple(np.zeros(len(group)) for group in self.unknowns)
+        """Nominal parameters, effects at rest (first trial), frames (3, 3, K), (3, K)."""
+        effects = tuple(
+            at_trial(group, next(iter(effect.trials(self.rows))))
+            for effect, group in zip(self.effects, self.unknowns, strict=True)
+        )
         nominal = self.machine.nominal.copy()
         return State(nominal, effects, rotation, position, self.nominal_configuration)
 
@@ -171,17 +178,10 @@ class Model:
         BadInput
             Naming the reading at which the machine does not close.
         """
-        first, inverse = self._states
+        _, inverse = self._states
         rows = self.rows
-        before = self._signatures(state)
-        extension = rows.extension + _change(before, "extension", rows.extension)
-        parameters: Array = state.parameters
-        if any(s.parameters is not None for _, s in before):
-            held = np.repeat(state.parameters[:, None], rows.count, axis=1)
-            parameters = (held + _change(before, "parameters", held))[:, first]
-        closed = self._closed(extension[:, first], parameters, state.configuration)
+        closed, parameters, nest = self._settled(state)
         jacobians = pose_jacobians(self.machine, closed, parameters)
-        nest = rows.nest + _change(before, "nest", rows.nest)
         rotation = closed.poses.rotation[:, :, inverse]
         arm = rotate(rotation, nest)
         base = np.where(rows.on_platform, closed.poses.position[:, inverse] + arm, rows.nest)
@@ -212,20 +212,54 @@ class Model:
 
     def predict(self, state: State) -> Array:
         """What the tracker should read (3, N), mm, without derivatives."""
-        first, inverse = self._states
-        rows, before = self.rows, self._signatures(state)
-        extension = rows.extension + _change(before, "extension", rows.extension)
-        parameters: Array = state.parameters
-        if any(s.parameters is not None for _, s in before):
-            held = np.repeat(state.parameters[:, None], rows.count, axis=1)
-            parameters = (held + _change(before, "parameters", held))[:, first]
-        poses = self._closed(extension[:, first], parameters, state.configuration).poses
-        nest = rows.nest + _change(before, "nest", rows.nest)
+        _, inverse = self._states
+        rows = self.rows
+        closed, _, nest = self._settled(state)
+        poses = closed.poses
         arm = rotate(poses.rotation[:, :, inverse], nest)
         base = np.where(rows.on_platform, poses.position[:, inverse] + arm, rows.nest)
         turned = rotate(state.frame_rotation[:, :, rows.run], base)
         point = turned + state.frame_position[:, rows.run]
-        return point + _change(before, "point", point)
+        return point + _change(self._signatures(state), "point", point)
+
+    def _settled(self, state: State) -> tuple[Configuration, Array, Array]:
+        """Close the machine where its effects and its pose agree; also parameters and nests.
+
+        An effect's extension depends on the pose that it changes, weakly: the two are iterated.
+        """
+        rows, (first, inverse) = self.rows, self._states
+        started = any(np.any(linear) for linear in self._linear(state))
+        if state.situation is None and started:
+            without = self.start(state.frame_rotation, state.frame_position).effects
+            begun = self.linearise(replace(state, effects=without)).state
+            state = replace(begun, effects=state.effects)
+        moved = np.full_like(rows.extension, np.inf)
+        for _ in range(SETTLING_PASSES):
+            signatures = self._signatures(state)
+            change = _change(signatures, "extension", rows.extension)
+            parameters: Array = state.parameters
+            shaped = any(s.parameters is not None for _, s in signatures)
+            if shaped:
+                held = np.repeat(state.parameters[:, None], rows.count, axis=1)
+                parameters = (held + _change(signatures, "parameters", held))[:, first]
+            extension = (rows.extension + change)[:, first]
+            closed = self._closed(extension, parameters, state.configuration)
+            if not shaped and np.max(np.abs(change - moved), initial=0.0) < SETTLED:
+                break
+            if state.situation is None or not signatures:
+                break
+            moved = change
+            state = replace(
+                state,
+                configuration=closed,
+                situation=replace(
+                    state.situation,
+                    position=closed.poses.position[:, inverse],
+                    rotation=closed.poses.rotation[:, :, inverse],
+                    passive=closed.passive[:, inverse],
+                ),
+            )
+        return closed, parameters, rows.nest + _change(signatures, "nest", rows.nest)
 
     def _closed(
         self, extension: Array, parameters: Array, start: Configuration | None
@@ -245,11 +279,19 @@ class Model:
         """Linear amplitudes (U,) and signature of every effect; none before the first closure."""
         if state.situation is None:
             return []
-        answers = []
-        for effect, group, values in zip(self.effects, self.unknowns, state.effects, strict=True):
-            linear = np.where([u.nonlinear for u in group], 0.0, values)
-            answers.append((linear, effect.signature(state.situation, values)))
-        return answers
+        return [
+            (linear, effect.signature(state.situation, values))
+            for effect, linear, values in zip(
+                self.effects, self._linear(state), state.effects, strict=True
+            )
+        ]
+
+    def _linear(self, state: State) -> list[Array]:
+        """Values of every effect with zero in place of its nonlinear unknowns."""
+        return [
+            np.where([unknown.nonlinear for unknown in group], 0.0, values)
+            for group, values in zip(self.unknowns, state.effects, strict=True)
+        ]
 
     def _frame_columns(self, turned: Array) -> list[Array]:
         rows = self.rows
@@ -283,6 +325,13 @@ class Model:
         deviation = np.zeros(self.prior.size)
         deviation[: own.size] = own - self.centre[: own.size]
         return deviation
+
+
+def at_trial(unknowns: Sequence[Unknown], trial: Sequence[float]) -> Array:
+    """Values (U,) of an effect that does nothing yet, its nonlinear unknowns at a trial."""
+    values = np.zeros(len(unknowns))
+    values[[index for index, unknown in enumerate(unknowns) if unknown.nonlinear]] = trial
+    return values
 
 
 def channels_known(effect: Effect, rows: Rows) -> BoolArray:

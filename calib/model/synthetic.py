@@ -14,10 +14,7 @@ def synthetic_rows(model: Model, state: State, generator: np.random.Generator | 
 
     Without a generator the readings are exact.
     """
-    settled = model.linearise(state)
-    for _ in range(3):  # signatures depend on the pose that they move
-        settled = model.linearise(settled.state)
-    predicted = model.rows.position - settled.residual
+    predicted = model.rows.position - model.linearise(state).residual
     if generator is not None:
         predicted = predicted + noise(model.rows, generator)
     return replace(model.rows, position=predicted)
