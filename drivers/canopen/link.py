@@ -188,9 +188,11 @@ class CanLink:
                 raise self._lost(error) from error
 
     def _unanswered(self, node_id: int, error: Exception) -> DeviceError:
-        lost = self.faults.get("link")
-        if lost is not None or self._receiver_failed():
-            return lost or self._lost(error)
+        lost = self.faults.get("link") or self.faults.get(f"heartbeat {node_id}")
+        if lost is not None:
+            return lost
+        if self._receiver_failed():
+            return self._lost(error)
         return Silence(
             f"no answer within {SDO_DEADLINE_S} s ({error})",
             device=self.label(node_id),
@@ -302,6 +304,10 @@ class CanLink:
             raise fault
 
     # ------------------------------------------------------------ NMT and the end
+
+    async def send_heartbeat(self) -> None:
+        """Send our heartbeat once more than the watcher does; raises LinkLost."""
+        await self.send([(0x700 + self.address.pc_node, b"\x05")])
 
     async def operational(self) -> None:
         """Set all nodes OPERATIONAL."""

@@ -86,6 +86,9 @@ class MachineBus:
                 await device.call(partial(configure, device))
         except Silence as error:
             raise ConnectFailed(error.what, device=error.device, remedy=error.remedy) from error
+        # A consumer begins to watch with the first heartbeat that it hears: give it one now, or
+        # this PC could enable the machine and die unnoticed.
+        await self.link.send_heartbeat()
         await self.link.operational()
         deadline = begin + address.silence_s + FIRST_HEARTBEAT_S
         while missing := [d for d in self.devices if not self.link.heard_since(d.id, begin)]:

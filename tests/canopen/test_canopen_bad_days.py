@@ -1,0 +1,203 @@
+"""Everything that goes wrong between PC, bus and drives ends at rest and in words."""
+
+import asyncio
+import socket
+import time
+
+import can
+import pytest
+
+from drivers.canopen import CanopenController
+from drivers.errors import (
+    ConnectFailed,
+    DeviceFault,
+    DriveFault,
+    HeartbeatLost,
+    LinkLost,
+    Refused,
+)
+
+HOME = (0.0, 0.0, 220.0, 0.0, 0.0, 0.0)
+LOW = (0.0, 0.0, 206.0, 0.0, 0.0, 0.0)
+HIGH = (0.0, 0.0, 246.0, 0.0, 0.0, 0.0)
+
+
+async def until(true, timeout: float = 5.0) -> None:
+    deadline = time.monotonic() + timeout
+    while not true():
+        assert time.monotonic() < deadline
+        await asyncio.sleep(0.01)
+
+
+async def go(controller: CanopenController, pose: tuple[float, ...]) -> None:
+    await controller.move_to_pose(pose)
+    await controller.wait_arrived(5.0)
+
+
+async def slow(controller: CanopenController) -> None:
+    """Make moves from here take some wall seconds, so that something can happen meanwhile."""
+    await go(controller, LOW)
+    device = controller._bus.controller
+    await device.call(lambda: device.download(0x2430, 0, (b"\x00" * 6 + b"\xd0\x3f")))  # 0.25 mm/s
+
+
+async def test_drive_fault_in_a_move_stops_all_legs(station, connected, enabled):
+    await slow(enabled)
+    await enabled.move_to_pose(HIGH)
+    station.hands("fault", name="drive-fault:4")
+    with pytest.raises(DriveFault, match=r"q4 .*hardware error"):
+        await enabled.wait_arrived(5.0)
+    await until(lambda: not station.moving)
+    assert any(a.fault and "0x5000" in a.what for a in connected.alarms)
+    with pytest.raises(DriveFault):
+        await enabled.move_to_pose(HOME)
+
+
+async def test_drive_stays_in_fault_until_the_cause_is_gone(station, enabled):
+    station.hands("fault", name="drive-fault:2")
+    await until(lambda: enabled._bus.link.faults)
+    with pytest.raises(DriveFault, match="q2"):
+        await enabled.clear_faults()
+    station.hands("clear")
+    await enabled.clear_faults()
+    enabled.check()
+    with pytest.raises(Refused, match="not enabled"):
+        await enabled.move_to_pose(HOME)
+    await enabled.enable()
+    await go(enabled, HOME)
+
+
+async def test_jammed_leg_becomes_a_following_error(station, connected, enabled):
+    await go(enabled, LOW)
+    await enabled.move_to_pose(HIGH)
+    station.hands("stall", leg=6)
+    with pytest.raises(DriveFault, match=r"q6 .*following error.*0x8611"):
+        await enabled.wait_arrived(5.0)
+    await until(lambda: not station.moving)
+    station.hands("unstall", leg=6)
+    await enabled.clear_faults()
+    await enabled.enable()
+    await go(enabled, HOME)
+
+
+@pytest.mark.parametrize("node", [3, 10])
+async def test_lost_heartbeat_stops_the_machine(station, connected, enabled, node: int):
+    await slow(enabled)
+    await enabled.move_to_pose(HIGH)
+    station.hands("fault", name=f"heartbeat-silent:{node}")
+    with pytest.raises(HeartbeatLost, match=f"node {node}"):
+        await enabled.wait_arrived(5.0)
+    await until(lambda: not station.moving)
+    with pytest.raises(HeartbeatLost):
+        enabled.check()
+    assert [a.device for a in connected.alarms if a.fault][0].endswith(f"(node {node})")
+    station.hands("clear")
+    await enabled.clear_faults()
+    await enabled.enable()
+
+
+async def test_reset_connection_is_a_lost_link_and_the_machine_stops(station, enabled):
+    await slow(enabled)
+    await enabled.move_to_pose(HIGH)
+    station.hands("reset-tcp", of="can")
+    with pytest.raises(LinkLost, match="connect again"):
+        await enabled.wait_arrived(5.0)
+    with pytest.raises(LinkLost, match="emergency stop"):
+        await enabled.stop()
+    await enabled.stop()
+    with pytest.raises(LinkLost):
+        await enabled.read_parameters()
+    await until(lambda: not station.moving)
+
+    again = await CanopenController.connect("slcan", station.channel)
+    with pytest.raises(DriveFault, match="no longer hears the PC"):
+        again.check()
+    await again.clear_faults()
+    await again.enable()
+    await go(again, HOME)
+    await again.close()
+
+
+async def test_machine_stops_when_the_pc_says_nothing_more(station, connected, enabled):
+    await slow(enabled)
+    await enabled.move_to_pose(HIGH)
+    assert station.moving
+    enabled._bus.link._end.set()  # our heartbeat ends, as if this process hung
+    await until(lambda: not station.moving, 3.0)
+    await until(lambda: any("no longer hears" in a.what for a in connected.alarms))
+
+
+async def test_switching_off_and_on_is_noticed(station, connected, enabled):
+    station.power_cycle()
+    await until(lambda: len(enabled._bus.link.faults) == 7)
+    with pytest.raises(DeviceFault, match="switched off and on"):
+        enabled.check()
+    await enabled.clear_faults()
+    await enabled.enable()
+    await go(enabled, HOME)
+
+
+async def test_quick_stop_in_the_middle_of_everything(station, enabled):
+    await slow(enabled)
+
+    async def work() -> None:
+        await enabled.move_to_pose(HIGH)
+        await enabled.wait_arrived(10.0)
+
+    working = [asyncio.ensure_future(work()), asyncio.ensure_future(enabled.state())]
+    await asyncio.sleep(0.05)
+    await enabled.stop()
+    assert not station.moving
+    with pytest.raises(DeviceFault):
+        await working[0]
+    await working[1]
+
+
+async def test_nobody_at_the_address():
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    with pytest.raises(ConnectFailed, match="Check address"):
+        await CanopenController.connect("slcan", f"socket://127.0.0.1:{port}")
+
+
+async def test_adapter_without_a_controller(station):
+    with pytest.raises(ConnectFailed, match="node 42"):
+        await CanopenController.connect("slcan", station.channel, node_id=42)
+
+
+async def test_drive_that_is_switched_off(station):
+    station.hands("fault", name="heartbeat-silent:5")
+    with pytest.raises(ConnectFailed, match="q5"):
+        await CanopenController.connect("slcan", station.channel)
+
+
+async def test_another_serial_number(station):
+    with pytest.raises(Refused, match="serial number 1001, expected 77"):
+        await CanopenController.connect("slcan", station.channel, serial="77")
+
+
+async def test_controller_with_wider_limits_than_the_machine_file(station):
+    with pytest.raises(Refused, match="lets q2 go from 195 to 265"):
+        await CanopenController.connect("slcan", station.channel, limits={"q2": (200.0, 260.0)})
+
+
+async def test_closing_takes_the_power_off_without_a_fault(station, controller):
+    await controller.enable()
+    await controller.close()
+    await controller.close()
+    await asyncio.sleep(1.2)
+    again = await CanopenController.connect("slcan", station.channel)
+    again.check()
+    assert {a.state for a in (await again.state()).actuators} == {"switch on disabled"}
+    await again.close()
+
+
+async def test_a_second_listener_disturbs_nothing(station, enabled):
+    with can.Bus(
+        interface="slcan", channel=station.channel, sleep_after_open=0, listen_only=True
+    ) as listener:
+        assert await asyncio.to_thread(listener.recv, 2.0) is not None
+        await go(enabled, LOW)
+        await asyncio.sleep(0.3)
+        heard = {message.arbitration_id for message in iter(lambda: listener.recv(0.01), None)}
+    assert {0x18A, 0x28A, 0x20A, 0x70A, 0x701} <= heard
