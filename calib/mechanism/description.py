@@ -33,6 +33,8 @@ class Parameter:
     tolerance: float
     sigma: float
     says: str = ""
+    hidden: bool = False
+    """An error source that is not calibrated: only the detailed machine has it."""
 
 
 @dataclass(frozen=True)
@@ -155,6 +157,9 @@ class Machine:
     size: float
     extra: Mapping[str, object]
     """Tables of the file that the mechanism does not need (effects' settings and the like)."""
+    detailed: "Machine | None" = None
+    """The same machine with its hidden parameters, after those of this one; None without any.
+    The two have the same joints: a configuration of one is a configuration of the other."""
 
     @cached_property
     def nominal(self) -> Array:

@@ -17,6 +17,7 @@ from calib.mechanism.description import (
     Task,
     Term,
 )
+from calib.mechanism.hidden import with_hidden_apart
 from calib.quantity import quantity
 from calib.toml_place import line_of, load_toml
 
@@ -27,10 +28,10 @@ _TOP = (
     "format", "name", "says", "source", "home", "task", "workspace", "parameters", "actuators",
     "limb_types", "limbs", "effects", "drawing", "closure", "nests",
 )  # fmt: skip
-_TYPE_KEYS = ("chain", "parameters", "joints", "says")
-_PARAMETER_KEYS = ("unit", "tolerance", "sigma", "nominal", "says")
+_TYPE_KEYS = ("chain", "chains", "parameters", "joints", "says")
+_PARAMETER_KEYS = ("unit", "tolerance", "sigma", "nominal", "says", "hidden")
 _ACTUATOR_KEYS = ("unit", "reference", "home", "limits", "says")
-_LIMB_KEYS = ("type", "chain", "parameters", "joints", "says")
+_LIMB_KEYS = ("type", "chain", "chains", "parameters", "joints", "says")
 
 
 def parse_machine(text: str, source: str) -> Machine:
@@ -112,10 +113,10 @@ class _Reader:
         limb_tables = self.table("limbs")
         if not limb_tables:
             raise self.fail("no limb is described", remedy="Add tables [limbs.NAME].")
-        limbs = tuple(self.limb(key, limb_tables[key]) for key in limb_tables)
+        limbs = tuple(limb for key in limb_tables for limb in self.limb(key, limb_tables[key]))
         self.check_references(limbs)
         home = self.home()
-        return Machine(
+        machine = Machine(
             name=name,
             says=self.text_of(self.data, "says"),
             source=self.source,
@@ -132,6 +133,7 @@ class _Reader:
                 if k in self.data
             },
         )
+        return with_hidden_apart(machine)
 
     def number(self, value: object, unit: str, *keys: str) -> float:
         return quantity(value, unit, self.place(*keys))
@@ -208,10 +210,12 @@ class _Reader:
                 tolerance or float(sigma * np.sqrt(3.0)),
                 float(sigma),
                 self.text_of(spec, "says", *keys),
+                spec.get("hidden") is True,
             )
         )
 
-    def limb(self, name: str, spec: Any) -> Limb:
+    def limb(self, name: str, spec: Any) -> list[Limb]:
+        """A limb, or the several that go by one name (the rods of a parallelogram)."""
         keys = ("limbs", name)
         if not isinstance(spec, dict):
             raise self.fail(f'limb "{name}" must be a table', *keys)
@@ -226,34 +230,51 @@ class _Reader:
             )
         kind = types.get(kind_name, {})
         self.known(kind, _TYPE_KEYS, "limb_types", kind_name)
-        chain_keys = (*keys, "chain") if "chain" in spec else ("limb_types", kind_name, "chain")
-        chain = self.text_of(spec, "chain", *keys) or self.text_of(kind, "chain", *chain_keys[:-1])
-        if not chain:
-            raise self.fail(
-                f'limb "{name}" has no chain', *keys, remedy='Write chain = "tx:... Rx ...".'
-            )
+        chains, chain_place = self.chains(name, spec, kind_name, kind)
         declared = {**kind.get("parameters", {}), **spec.get("parameters", {})}
         for key, description in declared.items():
             place = (*keys, key) if key in spec else ("limb_types", kind_name, "parameters", key)
             self.add_parameter(f"{name}.{key}", description, place, spec.get(key))
         used: set[str] = set()
-        reader = ChainReader(
-            lambda symbol, unit, place: self.resolve(
-                name, spec, declared, used, symbol, unit, place
-            ),
-            f"{self.place(*chain_keys)}, limb {name}",
-            self.joints,
-            self.joint_limits(kind_name, kind, spec, keys),
-        )
-        reader.read(chain)
-        self.check_names(name, spec, declared, used, reader)
-        self.joints += len(reader.joints)
-        return Limb(
-            name,
-            tuple(reader.elements),
-            tuple(reader.joints),
-            self.joints - len(reader.joints),
-        )
+        limits = self.joint_limits(kind_name, kind, spec, keys)
+        limbs, unknown = [], dict(limits)
+        for chain in chains:
+            reader = ChainReader(
+                lambda symbol, unit, place: self.resolve(
+                    name, spec, declared, used, symbol, unit, place
+                ),
+                f"{chain_place}, limb {name}",
+                self.joints,
+                dict(limits),
+            )
+            reader.read(chain)
+            unknown = {joint: v for joint, v in unknown.items() if joint in reader.limits}
+            self.joints += len(reader.joints)
+            first = self.joints - len(reader.joints)
+            limbs.append(Limb(name, tuple(reader.elements), tuple(reader.joints), first))
+        self.check_names(name, spec, declared, used, unknown)
+        return limbs
+
+    def chains(
+        self, name: str, spec: Mapping[str, Any], kind_name: str, kind: Mapping[str, Any]
+    ) -> tuple[list[str], str]:
+        """The chains of a limb and where they stand."""
+        own = "chain" in spec or "chains" in spec
+        table, keys = (spec, ("limbs", name)) if own else (kind, ("limb_types", kind_name))
+        if "chains" in table:
+            chains = table["chains"]
+            if not isinstance(chains, list) or not all(isinstance(c, str) for c in chains):
+                raise self.fail("chains is a list of chains", *keys, "chains")
+            return chains, self.place(*keys, "chains")
+        chain = self.text_of(table, "chain", *keys)
+        if not chain:
+            raise self.fail(
+                f'limb "{name}" has no chain',
+                "limbs",
+                name,
+                remedy='Write chain = "tx:... Rx ...".',
+            )
+        return [chain], self.place(*keys, "chain")
 
     def joint_limits(
         self,
@@ -326,7 +347,7 @@ class _Reader:
         spec: Mapping[str, Any],
         declared: Mapping[str, Any],
         used: set[str],
-        reader: ChainReader,
+        unknown_joints: Mapping[str, object],
     ) -> None:
         for key in (*spec, *declared):
             if key not in used and key not in _LIMB_KEYS:
@@ -336,9 +357,9 @@ class _Reader:
                     "limbs", name, key,
                     remedy=f'Did you mean "{near[0]}"?' if near else "Remove it, or use it.",
                 )  # fmt: skip
-        if reader.limits:
+        if unknown_joints:
             raise self.fail(
-                f'limb "{name}" has no joint named "{next(iter(reader.limits))}"',
+                f'limb "{name}" has no joint named "{next(iter(unknown_joints))}"',
                 "limbs", name,
                 remedy="Name joints in the chain: psi=Rx(90d).",
             )  # fmt: skip
