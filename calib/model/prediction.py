@@ -307,8 +307,12 @@ class Model:
         parameters = state.parameters.copy()
         parameters[self.free] += step[: self.free.size]
         at, effects = self.free.size, []
-        for values in state.effects:
-            effects.append(values + step[at : at + values.size])
+        for group, values in zip(self.unknowns, state.effects, strict=True):
+            moved = values + step[at : at + values.size]
+            scanned = np.array([unknown.nonlinear for unknown in group])
+            # A period or a time constant has a sign: it moves by half of itself at most.
+            near = np.clip(moved, 0.5 * values, 1.5 * values)
+            effects.append(np.where(scanned & (values > 0), near, moved))
             at += values.size
         frame = step[at:].reshape(self.frames, 6).T
         return replace(

@@ -1,0 +1,176 @@
+"""Diagnosis of a fitted run: which effect is missing, how large, and what adding it would bring."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from calib.arrays import Array
+from calib.discover.diagnosis import Diagnosis, Finding, diagnose
+from calib.discover.run_problem import (
+    EffectColumns,
+    effect_candidates,
+    effect_columns,
+    problem_of,
+    quadratics_of,
+    variables_of,
+)
+from calib.discover.structure import structure_candidates
+from calib.effects.component import Effect
+from calib.identify.fitting import Fit, fit
+from calib.identify.holdout import HoldOut, hold_out, hold_out_of
+from calib.model.prediction import Model, State
+from calib.runs.stack import Rows
+
+
+@dataclass(frozen=True, eq=False)
+class Outlook:
+    """What the error would be with one more effect, to first order, in mm."""
+
+    rms_mm: float
+    holdout: HoldOut
+
+
+@dataclass(frozen=True, eq=False)
+class RunDiagnosis:
+    """A fit, what is missing from it, and the signatures of the candidates.
+
+    ``unavailable`` says why some effects of the catalogue cannot be seen in these readings.
+    """
+
+    fit: Fit
+    diagnosis: Diagnosis
+    effects: tuple[EffectColumns, ...]
+    unavailable: dict[str, str]
+
+    @cached_property
+    def holdout(self) -> HoldOut:
+        """Hold-out of the fit."""
+        return hold_out(self.fit)
+
+    def columns_of(self, name: str) -> EffectColumns:
+        """Signatures of a candidate."""
+        return next(one for one in self.effects if one.effect.id == name)
+
+    def outlook(self, finding: Finding) -> Outlook:
+        """RMS and hold-out RMS with one more effect at its best trial, to first order."""
+        one, fitted = self.columns_of(finding.name), self.fit
+        own = one.columns[one.trials.index(finding.trial)]
+        unknowns = [unknown for unknown in one.unknowns if not unknown.nonlinear]
+        sigma = np.array([unknown.sigma or 1e3 * unknown.size for unknown in unknowns])
+        jacobian = np.concatenate([fitted.linear.jacobian, own])
+        precision = np.concatenate([fitted.prior_precision, 1.0 / sigma**2])
+        pull = np.concatenate(
+            [
+                fitted.prior_precision * fitted.model.deviation(fitted.linear.state),
+                np.zeros(sigma.size),
+            ]
+        )
+        rows, whitened = fitted.model.rows, fitted.linear.whitened
+        accepted = fitted.accepted & one.known
+        chosen = jacobian[:, :, accepted].reshape(precision.size, -1)
+        normal = chosen @ chosen.T + np.diag(precision)
+        scale = 1.0 / np.sqrt(np.diag(normal))
+        slope = chosen @ whitened[:, accepted].reshape(-1) - pull
+        step = scale * np.linalg.solve(normal * scale[:, None] * scale, scale * slope)
+        left = whitened - np.tensordot(step, jacobian, axes=1)
+        factors = np.linalg.inv(np.moveaxis(rows.whitener, -1, 0))[accepted]
+        natural = np.einsum("nij,jn->in", factors, left[:, accepted])
+        rms = float(np.sqrt(np.mean(np.sum(natural**2, axis=0))))
+        held = hold_out_of(rows, accepted, whitened, jacobian, precision, pull)
+        return Outlook(rms, held)
+
+
+def diagnose_fit(
+    fitted: Fit, catalogue: Sequence[Effect], generator: np.random.Generator
+) -> RunDiagnosis:
+    """Ask what is missing from a fit.
+
+    Parameters
+    ----------
+    fitted : Fit
+    catalogue : sequence of Effect
+        Candidates; those in the model already are left aside.
+    generator : numpy Generator
+        Draws the null distribution; the same seed gives the same answer.
+    """
+    rows = fitted.model.rows
+    problem = problem_of(fitted)
+    columns = effect_columns(fitted, catalogue)
+    answer = diagnose(
+        problem,
+        effect_candidates(fitted, problem, columns),
+        structure_candidates(variables_of(fitted)),
+        quadratics_of(fitted),
+        rng=generator,
+    )
+    reasons = {effect.id: effect.unavailable(rows) for effect in catalogue}
+    unavailable = {name: reason for name, reason in reasons.items() if reason}
+    return RunDiagnosis(fitted, answer, tuple(columns), unavailable)
+
+
+def fit_effects(
+    rows: Rows, effects: Sequence[Effect], masked: Sequence[int] = (), begun: Fit | None = None
+) -> Fit:
+    """Fit a model with effects; unknowns that are nonlinear are searched for first.
+
+    Parameters
+    ----------
+    rows : Rows
+    effects : sequence of Effect
+    masked : sequence of int
+        Readings that the operator has masked.
+    begun : Fit, optional
+        A fit with the first of these effects, to begin with.
+    """
+    done = len(begun.model.effects) if begun is not None else 0
+    latest = begun
+    for count in range(done, len(effects)):
+        nonlinear = any(unknown.nonlinear for unknown in effects[count].unknowns(rows))
+        if not nonlinear:
+            continue
+        latest = _fitted(rows, effects[:count], masked, latest)
+        (one,) = effect_columns(latest, [effects[count]])
+        start = _searched(latest, one)
+        latest = fit(Model(rows, effects[: count + 1]), start=start, masked=masked)
+    return _fitted(rows, effects, masked, latest)
+
+
+def _fitted(
+    rows: Rows, effects: Sequence[Effect], masked: Sequence[int], latest: Fit | None
+) -> Fit:
+    """Fit, beginning at what an earlier fit with fewer effects has found."""
+    if latest is not None and len(latest.model.effects) == len(effects):
+        return latest
+    model = Model(rows, effects)
+    if latest is None:
+        return fit(model, masked=masked)
+    state = latest.linear.state
+    rest = model.start(state.frame_rotation, state.frame_position).effects
+    values = (*state.effects, *rest[len(state.effects) :])
+    return fit(model, start=begin_at(state, values), masked=masked)
+
+
+def begin_at(state: State, values: tuple[Array, ...]) -> State:
+    """Start of a larger model at the geometry and frames of a smaller one's optimum."""
+    return State(
+        state.parameters, values, state.frame_rotation, state.frame_position, state.configuration
+    )
+
+
+def _searched(latest: Fit, one: EffectColumns) -> State:
+    """Start at the trial that explains most of the residual, with its amplitudes."""
+    problem = problem_of(latest)
+    columns = one.columns[..., latest.accepted]
+    columns = columns.reshape(*one.columns.shape[:2], -1)
+    projected = problem.project(columns)
+    weight = columns @ projected.swapaxes(1, 2)
+    sizes = np.array([u.sigma or 1e3 * u.size for u in one.unknowns if not u.nonlinear])
+    weight = weight + np.diag(1.0 / sizes**2)
+    scores = columns @ problem.residual
+    amplitudes = np.linalg.solve(weight, scores[:, :, None])[:, :, 0]
+    best = int(np.argmax(np.sum(amplitudes * scores, axis=1)))
+    values = one.values(one.trials[best], amplitudes[best])
+    state = latest.linear.state
+    return begin_at(state, (*state.effects, values))

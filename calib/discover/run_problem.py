@@ -1,0 +1,180 @@
+"""A fit to a run as the linear core sees it: problem, effects as candidates, state variables.
+
+Components are ordered as (3, A) flattened: axis after axis over the accepted readings.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib.arrays import Array, BoolArray
+from calib.discover.candidate import Candidate, Term, fill_missing
+from calib.discover.problem import LinearProblem
+from calib.discover.quadratic import Neighbours, Quadratic, blocks_of
+from calib.discover.structure import Carrier, Variable
+from calib.effects.component import Effect, Signature, Unknown
+from calib.effects.tracker import rigid_motions
+from calib.identify.fitting import Fit
+from calib.mechanism.rigid import rotate, to_euler
+from calib.model.prediction import at_trial, channels_known, whitened_columns
+
+FIELDS = ("extension", "parameters", "nest", "point")
+
+
+@dataclass(frozen=True, eq=False)
+class EffectColumns:
+    """Signatures of an effect that is not in the model.
+
+    ``columns`` (T, k, 3, N) are whitened derivatives of all readings by the k linear unknowns at
+    each of T trials; ``known`` (N,) marks readings that have its channels.
+    """
+
+    effect: Effect
+    unknowns: tuple[Unknown, ...]
+    trials: tuple[tuple[float, ...], ...]
+    columns: Array
+    known: BoolArray
+
+    def values(self, trial: tuple[float, ...], amplitudes: Array) -> Array:
+        """Values of all unknowns (U,): nonlinear ones at a trial, linear ones as given."""
+        values = at_trial(self.unknowns, trial)
+        values[[not unknown.nonlinear for unknown in self.unknowns]] = amplitudes
+        return values
+
+
+def problem_of(fit: Fit) -> LinearProblem:
+    """State a fit as a linear problem over its accepted readings."""
+    return LinearProblem(fit.whitened, fit.jacobian, fit.prior_precision)
+
+
+def effect_columns(fit: Fit, effects: Sequence[Effect]) -> list[EffectColumns]:
+    """Signatures of every effect that these readings can show and the model does not hold."""
+    rows = fit.model.rows
+    held = {effect.id for effect in fit.model.effects}
+    return [
+        _columns(fit, effect)
+        for effect in effects
+        if effect.id not in held and not effect.unavailable(rows)
+    ]
+
+
+def _columns(fit: Fit, effect: Effect) -> EffectColumns:
+    rows, situation = fit.model.rows, fit.linear.situation
+    unknowns = effect.unknowns(rows)
+    linear = np.array([not unknown.nonlinear for unknown in unknowns])
+    trials = tuple(effect.trials(rows))
+    signatures = [effect.signature(situation, at_trial(unknowns, trial)) for trial in trials]
+    parts = [whitened_columns(one, situation) for one in _merged(signatures, linear)]
+    columns = np.concatenate(parts).reshape(len(trials), int(linear.sum()), 3, rows.count)
+    known = channels_known(effect, rows)
+    return EffectColumns(effect, unknowns, trials, columns * known, known)
+
+
+def _merged(signatures: list[Signature], linear: BoolArray) -> list[Signature]:
+    """Join signatures of the same kind along their unknowns: one whitening for all trials."""
+    kinds = [tuple(getattr(one, field) is not None for field in FIELDS) for one in signatures]
+    merged: list[Signature] = []
+    at = 0
+    while at < len(signatures):
+        end = at
+        while end < len(signatures) and kinds[end] == kinds[at]:
+            end += 1
+        parts = {
+            field: np.concatenate([getattr(one, field)[linear] for one in signatures[at:end]])
+            for field, there in zip(FIELDS, kinds[at], strict=True)
+            if there
+        }
+        merged.append(Signature(**parts))
+        at = end
+    return merged
+
+
+def effect_candidates(
+    fit: Fit, problem: LinearProblem, effects: Sequence[EffectColumns]
+) -> list[Candidate]:
+    """Effects as candidates over the accepted readings, in the order of ``effects``."""
+    return [_candidate(fit, problem, one) for one in effects]
+
+
+def _candidate(fit: Fit, problem: LinearProblem, one: EffectColumns) -> Candidate:
+    columns = _accepted(fit, one.columns)
+    missing = np.tile(~one.known[fit.accepted], 3)
+    if missing.any():
+        columns = fill_missing(problem, columns, missing)
+    terms = tuple(Term(u.name, u.unit, u.size, u.sigma) for u in one.unknowns if not u.nonlinear)
+    subsets = one.effect.parts(fit.model.rows)
+    return Candidate(one.effect.id, terms, columns, one.trials, subsets=subsets)
+
+
+def _accepted(fit: Fit, columns: Array) -> Array:
+    """(..., 3, N) -> (..., 3 A), contiguous."""
+    chosen = columns[..., fit.accepted]
+    return np.ascontiguousarray(chosen.reshape(*columns.shape[:-2], -1))
+
+
+def _rows_of(fit: Fit, values: Array) -> Array:
+    """State column (..., N) -> value of each component (..., 3 A)."""
+    chosen = values[..., fit.accepted]
+    return np.concatenate([chosen] * 3, axis=-1)
+
+
+def variables_of(fit: Fit) -> list[Variable]:
+    """Everything that the residual could depend on, with what it could act on."""
+    rows, situation = fit.model.rows, fit.linear.situation
+    columns = _accepted(fit, situation.actuator_columns)
+    unit = rows.machine.actuators[0].unit if rows.machine.actuators else "mm"
+    size = 0.01 if unit == "mm" else 1e-4
+    legs = Carrier("legs", columns, unit, size)
+    own = [Carrier(f"leg{k + 1}", columns[[k]], unit, size) for k in range(columns.shape[0])]
+    points = Carrier("point", _accepted(fit, np.swapaxes(rows.whitener, 0, 1)), "mm", 0.01)
+    found = [
+        Variable(f"q{k + 1}", _rows_of(fit, s), (leg,), ("smooth", "periodic"), _shortest(unit))
+        for k, (s, leg) in enumerate(zip(rows.extension, own, strict=True))
+    ]
+    found.append(Variable("direction", _rows_of(fit, rows.direction), (legs,)))
+    found.append(
+        Variable("time_s", _rows_of(fit, rows.time_s), (legs, points), ("smooth", "periodic"))
+    )
+    found += [
+        Variable(name, _rows_of(fit, values), (legs, points))
+        for name, values in rows.channels.items()
+        if np.isfinite(values[fit.accepted]).all()
+    ]
+    found += [
+        Variable(name, _rows_of(fit, values), (points,))
+        for name, values in zip("xyz", situation.point, strict=True)
+    ]
+    coordinates = np.concatenate([situation.position, to_euler(situation.rotation)])
+    found += [Variable("pose", _rows_of(fit, values), (legs,)) for values in coordinates]
+    return found
+
+
+def _shortest(unit: str) -> float:
+    """Shortest period along an actuator that is tried: a millimetre, or a degree and a bit."""
+    return 1.0 if unit == "mm" else 2.0 * np.pi / 200.0
+
+
+def quadratics_of(fit: Fit) -> list[Quadratic]:
+    """Neighbours in time that err alike, poses that move as one."""
+    rows, situation = fit.model.rows, fit.linear.situation
+    count = fit.readings
+    run, time = rows.run[fit.accepted], rows.time_s[fit.accepted]
+    platform = rows.on_platform[fit.accepted]
+    pair = np.flatnonzero(
+        (run[1:] == run[:-1]) & (time[1:] > time[:-1]) & platform[1:] & platform[:-1]
+    )
+    found: list[Quadratic] = []
+    if pair.size >= 10:
+        axes = count * np.arange(3)[:, None]
+        found.append(Neighbours((axes + pair).reshape(-1), (axes + pair + 1).reshape(-1)))
+    motions = rigid_motions(situation.base_point - situation.position)
+    turned = np.stack([rotate(situation.frame_rotation, one) for one in motions])
+    whitened = np.einsum("ijn,ujn->uin", rows.whitener, turned)
+    labels = [
+        f"{run} {name}" if on else ""
+        for run, name, on in zip(rows.run, rows.pose_name, rows.on_platform, strict=True)
+    ]
+    kept = [label for label, accepted in zip(labels, fit.accepted, strict=True) if accepted]
+    blocks = blocks_of(kept * 3, _accepted(fit, whitened))
+    return [*found, blocks] if blocks is not None else found
