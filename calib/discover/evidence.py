@@ -9,6 +9,8 @@ eigenvalues v) the whitened scores a have variance 1 + tau^2 v under the hypothe
 Nobody knows the size to better than an order of magnitude: tau is averaged over 1/30..3. A
 candidate's evidence is the mean of B over its trials (equal weights: each period that was tried
 is paid for), half of it on the whole group and half shared by the subsets that may act alone.
+Where even the best explanation leaves more than the stated noise, sigmas are taken larger by that
+(``scores.noise``): another effect that is missing too must not decide between these.
 """
 
 import numpy as np
@@ -21,6 +23,11 @@ TAUS = np.geomspace(1.0 / 30.0, 3.0, 7)
 """Multiples of the stated size over which the prior of an effect is averaged."""
 
 
+def observed(scores: Scores, index: int) -> Array:
+    """Scores (T, k, 1) of the observation in units of the noise as it really is."""
+    return scores.scores[index][:, :, :1] / scores.noise
+
+
 def log_evidence(scores: Scores, index: int, residual_scores: Array) -> tuple[Array, list[Array]]:
     """Log Bayes factor of a candidate against nothing missing.
 
@@ -30,7 +37,8 @@ def log_evidence(scores: Scores, index: int, residual_scores: Array) -> tuple[Ar
     index : int
         Which candidate.
     residual_scores : (T, k, D)
-        Its unit columns times D residuals (``scores.scores[index]`` or shifted draws).
+        Its unit columns times D residuals, in sigmas as they really are: ``observed(scores,
+        index)``, or shifted null draws.
 
     Returns
     -------
@@ -51,12 +59,10 @@ def log_evidence(scores: Scores, index: int, residual_scores: Array) -> tuple[Ar
     return np.asarray(total), parts
 
 
-def _by_trial(
-    scores: Scores, index: int, subset: tuple[int, ...], residual_scores: Array
-) -> Array:
+def _by_trial(scores: Scores, index: int, subset: tuple[int, ...], residual_scores: Array) -> Array:
     """Log Bayes factor (T, D) of one hypothesis, averaged over tau."""
     chosen = np.array(subset, dtype=np.intp)
-    size = scores.norms[index][:, chosen] * scores.candidates[index].sizes[chosen]
+    size = scores.norms[index][:, chosen] * scores.candidates[index].sizes[chosen] / scores.noise
     weight = scores.weights[index][:, chosen[:, None], chosen]
     values, vectors = np.linalg.eigh(weight * size[:, :, None] * size[:, None, :])
     values = np.maximum(values, 0.0)

@@ -80,9 +80,7 @@ class Scores:
     @cached_property
     def levels(self) -> list[Array]:
         """For every candidate the largest -log p over its hypotheses and trials, (1 + draws,)."""
-        return [
-            self.level(index, scores, self.squares) for index, scores in enumerate(self.scores)
-        ]
+        return [self.level(index, scores, self.squares) for index, scores in enumerate(self.scores)]
 
     def level(self, index: int, scores: Array, squares: Array) -> Array:
         """Largest -log p of a candidate for given scores (T, k, D) and |e|^2 (D,)."""
@@ -97,6 +95,20 @@ class Scores:
                 judged = (here / np.maximum(left, 1.0)).max(axis=0)
                 best = np.maximum(best, -log_tail(judged, int(dof)))
         return best
+
+    @cached_property
+    def noise(self) -> float:
+        """Standard deviation of a reading, in sigmas: 1, or what the best explanation leaves.
+
+        With more missing than one effect, what one leaves is noise to the comparison of two.
+        """
+        left = [float(self.squares[0]) / max(self.problem.trace, 1.0)]
+        for index, weighings in enumerate(self.weighings):
+            for weighing in weighings:
+                chi2 = chi_squares(weighing, self.scores[index][:, :, :1])[:, 0]
+                dof = np.maximum(self.problem.trace - weighing.dof, 1.0)
+                left.append(float(np.min((self.squares[0] - chi2) / dof)))
+        return float(np.sqrt(max(1.0, min(left))))
 
     def unit(self, index: int) -> Array:
         """Unit columns (T, k, R) of a candidate."""

@@ -1,0 +1,369 @@
+"""Which effect is missing? All candidates and all structure judged in one family.
+
+The candidates are scored against the residual of the current fit. Those that are significant are
+added to the linearised fit one by one, the one with the most evidence first, until none is left;
+what is significant then, and belongs to no candidate, is unexplained.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from calib.arrays import Array
+from calib.discover.candidate import Candidate
+from calib.discover.evidence import log_evidence, observed
+from calib.discover.family import Family, family
+from calib.discover.pairs import rivals
+from calib.discover.problem import LinearProblem
+from calib.discover.quadratic import Quadratic
+from calib.discover.scores import Scores, chi_squares, score
+
+ALPHA = 0.05
+DRAWS = 399
+STRUCTURE_SHARE = 0.25
+"""Part of the false alarms that structure of unknown origin may cause; effects have the rest."""
+IN_QUESTION = 7.0
+"""Candidates whose evidence is less than e^7 below the best are still in question."""
+UNKNOWN_MARGIN = 10.0
+"""Structure of unknown origin must beat the effects' evidence by e^10 to be preferred."""
+MOST_EFFECTS = 6
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One unknown's value and standard uncertainty."""
+
+    name: str
+    value: float
+    sigma: float
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """What is known of one candidate.
+
+    Attributes
+    ----------
+    index : int
+        Its place among the candidates that were given.
+    log_p, p_value : float
+        Family-wise.
+    log_evidence : float
+        Log Bayes factor against "nothing missing"; candidates are ranked by it.
+    chi2_fall, dof : float, int
+        Fall of chi-square if the hypothesis with the most evidence is added, and its freedom.
+    trial : tuple of float
+        Values of the nonlinear unknowns with the most evidence.
+    acting : tuple of str
+        Unknowns of the hypothesis with the most evidence (one leg, or all).
+    estimates : tuple of Estimate
+        All linear unknowns of the group at that trial.
+    visible : float
+        Of its signature, the part that the fit has not taken; a ratio of norms, without priors.
+    signature : (R,)
+        Whitened displacement of the readings by the hypothesis with the most evidence.
+    """
+
+    index: int
+    name: str
+    log_p: float
+    log_evidence: float
+    chi2_fall: float
+    dof: int
+    trial: tuple[float, ...]
+    acting: tuple[str, ...]
+    estimates: tuple[Estimate, ...]
+    visible: float
+    signature: Array
+
+    @property
+    def p_value(self) -> float:
+        """Family-wise p-value, no smaller than 1e-300."""
+        return float(np.exp(max(self.log_p, -690.0)))
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """A state variable on which the residual depends; ``period`` where a periodic one is best."""
+
+    channel: str
+    log_p: float
+    log_evidence: float
+    period: float | None = None
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """Structure that no candidate explains, the channels with the most evidence first."""
+
+    significant: bool
+    log_p: float
+    dependences: tuple[Dependence, ...] = ()
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the state variables."""
+        return tuple(dict.fromkeys(found.channel for found in self.dependences))
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """Answer to "what is missing?".
+
+    Attributes
+    ----------
+    findings : tuple of Finding
+        Every candidate, most evidence first.
+    explained_by : tuple of str
+        Candidates that one after the other were significant; empty if none.
+    indistinguishable : tuple of tuples of str
+        For each effect that was significant, itself first, those from which this run would tell
+        it with a probability below 0.8.
+    unexplained : Unexplained
+    unknown_preferred : bool
+        The residual is explained better by structure of unknown origin than by any candidates.
+    adequate : bool
+        Nothing is significant.
+    scatter : float
+        Variance of the readings beyond what was stated, once everything significant is in; 1 is
+        as stated.
+    """
+
+    findings: tuple[Finding, ...]
+    explained_by: tuple[str, ...]
+    indistinguishable: tuple[tuple[str, ...], ...]
+    unexplained: Unexplained
+    unknown_preferred: bool
+    adequate: bool
+    scatter: float
+    scores: Scores = field(repr=False)
+    family: Family = field(repr=False)
+
+    @property
+    def best(self) -> Finding | None:
+        """The effect to add, or None if nothing known is called for."""
+        if self.unknown_preferred or not self.explained_by:
+            return None
+        return next(found for found in self.findings if found.name == self.explained_by[0])
+
+
+@dataclass(frozen=True, eq=False)
+class _Round:
+    """One state of the linearised fit, judged."""
+
+    scores: Scores
+    family: Family
+    effects: tuple[int, ...]
+
+    def log_p(self, index: int) -> float:
+        return self.family.log_p(float(self.family.strengths[index, 0]))
+
+    def significant(self, alpha: float) -> list[int]:
+        limit = np.log(alpha) + 1e-9
+        return [index for index in self.effects if self.log_p(index) <= limit]
+
+
+def diagnose(
+    problem: LinearProblem,
+    effects: Sequence[Candidate],
+    structure: Sequence[Candidate] = (),
+    quadratic: Sequence[Quadratic] = (),
+    *,
+    rng: np.random.Generator,
+    draws: int = DRAWS,
+    alpha: float = ALPHA,
+) -> Diagnosis:
+    """Judge all candidates and all structure as one family.
+
+    Parameters
+    ----------
+    problem : LinearProblem
+        The fit as it is.
+    effects : sequence of Candidate
+        Known effects that are not in the fit.
+    structure : sequence of Candidate
+        See :func:`calib.discover.structure.structure_candidates`.
+    quadratic : sequence of Neighbours or Blocks
+    rng : numpy Generator
+        Draws the null distribution; the same seed gives the same answer.
+    draws : int
+        Null draws; 399 makes P(p <= 0.05) exactly 0.05.
+    alpha : float
+        Family-wise false alarm.
+    """
+    scores = score(problem, [*effects, *structure], rng, draws)
+    first = _judge(scores, len(effects), quadratic)
+    order, evidences = _ranked(first)
+    findings = {index: _finding(first, index, evidences[index]) for index in order}
+    chosen, groups, last = _explain(first, quadratic, alpha, rng)
+    left = _unexplained(last, quadratic, alpha)
+    before = _unexplained(first, quadratic, alpha)
+    unknown = max((d.log_evidence for d in before.dependences), default=0.0)
+    preferred = unknown > sum(value for _, value in chosen) + UNKNOWN_MARGIN
+    if preferred and not left.significant:
+        left = before
+    return Diagnosis(
+        findings=tuple(findings[index] for index in order),
+        explained_by=tuple(scores.candidates[index].name for index, _ in chosen),
+        indistinguishable=tuple(
+            tuple(scores.candidates[index].name for index in group) for group in groups
+        ),
+        unexplained=left,
+        unknown_preferred=preferred,
+        adequate=not chosen and not left.significant,
+        scatter=float(last.scores.squares[0]) / max(last.scores.problem.trace, 1.0),
+        scores=scores,
+        family=first.family,
+    )
+
+
+def _judge(scores: Scores, effects: int, quadratic: Sequence[Quadratic]) -> _Round:
+    """Join effects, structure and quadratic tests to a family."""
+    levels = [*scores.levels, *(test.level(scores.residuals) for test in quadratic)]
+    weights = np.ones(len(levels))
+    others = len(levels) - effects
+    if effects and others:
+        weights[effects:] = effects * STRUCTURE_SHARE / (1.0 - STRUCTURE_SHARE) / others
+    return _Round(scores, family(levels, weights), tuple(range(effects)))
+
+
+def _observed_evidence(scores: Scores, index: int) -> tuple[float, list[Array]]:
+    total, parts = log_evidence(scores, index, observed(scores, index))
+    return float(total[0]), parts
+
+
+def _ranked(judged: _Round) -> tuple[list[int], dict[int, float]]:
+    evidences = {i: _observed_evidence(judged.scores, i)[0] for i in judged.effects}
+    return sorted(judged.effects, key=lambda index: -evidences[index]), evidences
+
+
+def _explain(
+    judged: _Round, quadratic: Sequence[Quadratic], alpha: float, rng: np.random.Generator
+) -> tuple[list[tuple[int, float]], list[tuple[int, ...]], _Round]:
+    """Add significant effects one by one; returns them with their evidence, groups, the end."""
+    chosen: list[tuple[int, float]] = []
+    groups: list[tuple[int, ...]] = []
+    while len(chosen) < MOST_EFFECTS:
+        taken = {index for index, _ in chosen}
+        significant = [index for index in judged.significant(alpha) if index not in taken]
+        if not significant:
+            break
+        order, evidences = _ranked(judged)
+        best = next(index for index in order if index in significant)
+        questioned = _in_question(judged, order, evidences, best, alpha)
+        signatures = {i: _signature(judged.scores, i)[0] for i in questioned}
+        if others := rivals(judged.scores, best, questioned, signatures):
+            groups.append((best, *others))
+        chosen.append((best, evidences[best]))
+        columns, precision = _joining(judged.scores, best)
+        judged = _judge(
+            judged.scores.without(columns, precision, rng), len(judged.effects), quadratic
+        )
+    return chosen, groups, judged
+
+
+def _in_question(
+    judged: _Round, order: list[int], evidences: dict[int, float], best: int, alpha: float
+) -> list[int]:
+    """The best, and those that are significant on their own and not yet refuted by the data."""
+    own = judged.family.own_log_p
+    return [
+        index
+        for index in order
+        if index == best
+        or (own[index] <= np.log(alpha) and evidences[index] > evidences[best] - IN_QUESTION)
+    ]
+
+
+def _best_hypothesis(scores: Scores, index: int) -> tuple[int, int]:
+    """Number of the hypothesis and of the trial with the most evidence."""
+    _, parts = _observed_evidence(scores, index)
+    number = int(np.argmax([part[:, 0].max() for part in parts]))
+    return number, int(np.argmax(parts[number][:, 0]))
+
+
+def _signature(scores: Scores, index: int) -> tuple[Array, int, int]:
+    """Signature (R,) of a candidate's best hypothesis at its estimate; hypothesis and trial."""
+    number, trial = _best_hypothesis(scores, index)
+    candidate = scores.candidates[index]
+    subset = candidate.hypotheses[number]
+    beta, _ = scores.estimate(index, trial, subset)
+    return beta @ candidate.columns[trial, list(subset)], number, trial
+
+
+def _joining(scores: Scores, index: int) -> tuple[Array, Array]:
+    """Columns and prior precision with which a candidate joins the linearised fit.
+
+    The whole group at its best trial and, along a scanned unknown, first and second differences
+    of its signature between neighbouring trials: the refit would find the value between two.
+    """
+    candidate = scores.candidates[index]
+    _, trial = _best_hypothesis(scores, index)
+    columns = [*candidate.columns[trial]]
+    precision = [*candidate.prior_precision]
+    if len(candidate.trials) > 2 and len(candidate.trials[0]) == 1:
+        middle = min(max(trial, 1), len(candidate.trials) - 2)
+        beta, _ = scores.estimate(index, trial, candidate.hypotheses[0])
+        low, here, high = (beta @ candidate.columns[middle + step] for step in (-1, 0, 1))
+        for difference in (high - low, high + low - 2.0 * here):
+            if float(difference @ difference) > 0.0:
+                columns.append(difference)
+                precision.append(1e-2)
+    return np.array(columns), np.array(precision)
+
+
+def _finding(judged: _Round, index: int, evidence: float) -> Finding:
+    scores, candidate = judged.scores, judged.scores.candidates[index]
+    signature, number, trial = _signature(scores, index)
+    subset = candidate.hypotheses[number]
+    weighing = scores.weighings[index][number]
+    beta, covariance = scores.estimate(index, trial, candidate.hypotheses[0])
+    sigmas = np.sqrt(np.diag(covariance))
+    return Finding(
+        index=index,
+        name=candidate.name,
+        log_p=judged.log_p(index),
+        log_evidence=evidence,
+        chi2_fall=float(chi_squares(weighing, scores.scores[index][:, :, :1])[trial, 0]),
+        dof=int(weighing.dof[trial]),
+        trial=candidate.trials[trial],
+        acting=tuple(candidate.terms[term].name for term in subset),
+        estimates=tuple(
+            Estimate(term.name, float(value), float(sigma), term.unit)
+            for term, value, sigma in zip(candidate.terms, beta, sigmas, strict=True)
+        ),
+        visible=scores.problem.visible(candidate.sizes[:, None] * candidate.columns[trial]),
+        signature=signature,
+    )
+
+
+def _unexplained(judged: _Round, quadratic: Sequence[Quadratic], alpha: float) -> Unexplained:
+    """Structure that is significant in a round, the channels with the most evidence first."""
+    scores = judged.scores
+    count = len(scores.candidates)
+    found: dict[str, Dependence] = {}
+    smallest = 0.0
+    for index in range(len(judged.effects), count + len(quadratic)):
+        log_p = judged.log_p(index)
+        smallest = min(smallest, log_p)
+        if log_p > np.log(alpha) + 1e-9:
+            continue
+        if index < count:
+            here = _dependence(scores, index, log_p)
+        else:
+            here = Dependence(quadratic[index - count].channel, log_p, -log_p)
+        known = found.get(here.channel)
+        if known is None or here.log_evidence > known.log_evidence:
+            found[here.channel] = here
+    ordered = sorted(found.values(), key=lambda each: -each.log_evidence)
+    return Unexplained(bool(ordered), smallest, tuple(ordered))
+
+
+def _dependence(scores: Scores, index: int, log_p: float) -> Dependence:
+    candidate = scores.candidates[index]
+    evidence, _ = _observed_evidence(scores, index)
+    _, trial = _best_hypothesis(scores, index)
+    period = candidate.trials[trial][0] if candidate.trials[trial] else None
+    return Dependence(candidate.channel, log_p, evidence, period)

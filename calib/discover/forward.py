@@ -1,0 +1,113 @@
+"""Add the missing effects one by one: diagnose, add the best, refit, and see the error fall.
+
+An effect is accepted only if held-out poses are predicted no worse with it than without; one that
+is refused is not offered again, and the next is tried. In the end every effect must still be
+called for beside the others: one that a later effect has made superfluous is taken out.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from calib.discover.diagnosis import Diagnosis
+
+MOST_STEPS = 8
+SLACK = 1e-6
+"""Relative rise of the hold-out error that counts as none (rounding of a refit)."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A refitted model and what is missing from it.
+
+    ``holdout`` is the RMS over held-out poses; ``diagnosis`` that of the refitted model.
+    """
+
+    effects: tuple[str, ...]
+    holdout: float
+    diagnosis: Diagnosis
+
+
+@dataclass(frozen=True)
+class Step:
+    """What was done: ``added`` or ``removed`` an effect (both None at the start)."""
+
+    stage: Stage
+    added: str | None = None
+    removed: str | None = None
+
+
+@dataclass(frozen=True)
+class Discovery:
+    """The staircase: accepted steps, effects that were refused, and groups seen on the way."""
+
+    steps: tuple[Step, ...]
+    refused: tuple[str, ...]
+    indistinguishable: tuple[tuple[str, ...], ...]
+
+    @property
+    def last(self) -> Stage:
+        """The model in the end."""
+        return self.steps[-1].stage
+
+
+def discover(
+    refit: Callable[[tuple[str, ...]], Stage],
+    begin: tuple[str, ...] = (),
+    *,
+    keep: Sequence[str] = (),
+) -> Discovery:
+    """Go from the effects ``begin`` to a model from which nothing known is missing.
+
+    Parameters
+    ----------
+    refit : callable
+        Refits the model with the named effects, diagnoses it and answers a :class:`Stage`.
+    begin : tuple of str
+        Effects in the model at the start.
+    keep : sequence of str
+        Effects that the operator has put in and that stay.
+    """
+    steps = [Step(refit(begin))]
+    refused: list[str] = []
+    groups: list[tuple[str, ...]] = []
+    while len(steps) <= MOST_STEPS:
+        now = steps[-1].stage
+        added = _next(now, refused)
+        if added is None:
+            break
+        tried = refit((*now.effects, added))
+        if tried.holdout > now.holdout * (1.0 + SLACK):
+            refused.append(added)
+            continue
+        groups += [group for group in now.diagnosis.indistinguishable if group not in groups]
+        steps.append(Step(tried, added=added))
+    steps += _superfluous(refit, steps[-1].stage, frozenset((*begin, *keep)))
+    last = steps[-1].stage.effects
+    here = [group for group in groups if set(group) & set(last)]
+    return Discovery(tuple(steps), tuple(refused), tuple(here))
+
+
+def _next(stage: Stage, refused: Sequence[str]) -> str | None:
+    """Name the best effect that is called for and has not been refused."""
+    diagnosis = stage.diagnosis
+    if diagnosis.unknown_preferred or not diagnosis.explained_by:
+        return None
+    called = [name for name in diagnosis.explained_by if name not in refused]
+    return called[0] if called else None
+
+
+def _superfluous(
+    refit: Callable[[tuple[str, ...]], Stage], stage: Stage, keep: frozenset[str]
+) -> list[Step]:
+    """Take out effects, the first added first, that the others have made superfluous."""
+    steps: list[Step] = []
+    for name in stage.effects:
+        now = steps[-1].stage if steps else stage
+        if name in keep or len(now.effects) < 2:
+            continue
+        without = refit(tuple(other for other in now.effects if other != name))
+        if name in without.diagnosis.explained_by:
+            continue
+        if without.diagnosis.adequate and without.holdout <= now.holdout * (1.0 + SLACK):
+            steps.append(Step(without, removed=name))
+    return steps

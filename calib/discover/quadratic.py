@@ -1,0 +1,84 @@
+"""Structure that no smooth function shows: neighbours in time alike, poses that move as one.
+
+Both are ratios of quadratic forms in the residual, so that a wrong sigma alone moves neither.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from calib.arrays import Array, IntArray
+from calib.discover.tails import log_tail
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """Do components that follow each other in time err alike? sum e_before e_after / sum e^2."""
+
+    before: IntArray
+    after: IntArray
+    channel: str = "time_s"
+
+    def level(self, residuals: Array) -> Array:
+        """-log p (1 + draws,) from residuals (R, 1 + draws), observation first."""
+        product = np.einsum("pd,pd->d", residuals[self.before], residuals[self.after])
+        ratio = product / np.einsum("rd,rd->d", residuals, residuals)
+        null = ratio[1:]
+        return np.asarray(-stats.norm.logsf((ratio - null.mean()) / null.std()))
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Is more of the residual in given subspaces than noise would put there?
+
+    ``members`` (B, m) indices of components of each block (one pose, several nests) and ``bases``
+    (B, k, m) orthonormal motions of the block as a whole; sum |basis e|^2 / sum e^2, referred to
+    the chi-square with the mean and variance of the null draws (Satterthwaite 1946).
+    """
+
+    members: IntArray
+    bases: Array
+    channel: str = "pose"
+
+    def level(self, residuals: Array) -> Array:
+        """-log p (1 + draws,) from residuals (R, 1 + draws), observation first."""
+        within = self.bases @ residuals[self.members]
+        ratio = np.einsum("bkd,bkd->d", within, within)
+        ratio /= np.einsum("rd,rd->d", residuals, residuals)
+        null = ratio[1:]
+        dof = max(1, int(2.0 * null.mean() ** 2 / null.var()))
+        return -log_tail(ratio * dof / null.mean(), dof)
+
+
+Quadratic = Neighbours | Blocks
+
+
+def blocks_of(labels: Sequence[object], columns: Array) -> Blocks | None:
+    """Blocks of components with the same label, moving along ``columns``.
+
+    Parameters
+    ----------
+    labels : sequence of R labels
+        Pose of each component; empty or None belongs to no block.
+    columns : (k, R)
+        Whitened rigid motions (three shifts, three turns of the platform).
+
+    Only the blocks of the most frequent size are taken, and those of more components than
+    motions; None if there are fewer than three.
+    """
+    groups: dict[object, list[int]] = {}
+    for index, label in enumerate(labels):
+        if label not in ("", None):
+            groups.setdefault(label, []).append(index)
+    sizes = [len(group) for group in groups.values() if len(group) > columns.shape[0]]
+    if not sizes:
+        return None
+    usual = max(set(sizes), key=sizes.count)
+    members = np.array([group for group in groups.values() if len(group) == usual], dtype=np.intp)
+    if members.shape[0] < 3:
+        return None
+    motions = np.moveaxis(columns[:, members], 0, -1)
+    bases = np.swapaxes(np.linalg.qr(motions)[0], 1, 2)
+    return Blocks(members, bases)

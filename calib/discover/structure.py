@@ -1,0 +1,153 @@
+"""Structure of unknown origin: does the residual depend on any state variable, in any way?
+
+Carriers are directions in which something could move the readings (each actuator's extension,
+the point in space); variables are what it could depend on (pose coordinates, actuators, direction
+of approach, time, temperature, payload, nest, range and angles of the tracker). A structure
+candidate is every carrier times a few smooth functions of one variable. It is scored like an
+effect, and says what the rest depends on, not why.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from calib.arrays import Array
+from calib.discover.candidate import Candidate, Term
+
+ORDER = 4
+"""Highest order of the smooth functions (Legendre polynomials over the variable's range)."""
+MOST_PERIODS = 48
+"""Periods that are tried at most for one variable."""
+
+Kind = Literal["smooth", "levels", "periodic"]
+
+
+@dataclass(frozen=True, eq=False)
+class Carrier:
+    """Directions in which readings can be moved.
+
+    ``columns`` (c, R) whitened displacement of the readings per ``unit``; ``size`` in that unit
+    is how far things may reasonably be moved.
+    """
+
+    name: str
+    columns: Array
+    unit: str = "mm"
+    size: float = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Variable:
+    """What the residual may depend on.
+
+    Attributes
+    ----------
+    name : str
+        Channel: ``q1``, ``time_s``, ``direction``, ``x``, ``structure_temp_C`` ...
+    values : (R,) or (c, R)
+        One value for each component; one row for each of the carrier's directions where each has
+        a value of its own (direction of approach of each actuator).
+    carriers : tuple of Carrier
+        What it may act on; each makes a candidate.
+    kinds : tuple of "smooth", "levels", "periodic"
+    shortest : float, optional
+        Shortest period that is tried; default twice the median distance of distinct values.
+    """
+
+    name: str
+    values: Array
+    carriers: tuple[Carrier, ...]
+    kinds: tuple[Kind, ...] = ("smooth",)
+    shortest: float | None = None
+
+
+def structure_candidates(variables: Sequence[Variable]) -> list[Candidate]:
+    """Candidates for everything the residual could depend on; constant variables give none."""
+    found = []
+    for variable in variables:
+        if not np.isfinite(variable.values).all() or np.ptp(variable.values) == 0.0:
+            continue
+        for carrier in variable.carriers:
+            for kind in variable.kinds:
+                if kind == "smooth":
+                    found.append(_smooth(variable, carrier))
+                elif kind == "levels":
+                    found.append(_levels(variable, carrier))
+                else:
+                    found.append(_periodic(variable, carrier))
+    return found
+
+
+def _smooth(variable: Variable, carrier: Carrier) -> Candidate:
+    """Polynomials up to the order that the distinct values allow; lower orders stand alone too."""
+    values = np.broadcast_to(variable.values, carrier.columns.shape)
+    distinct = min(np.unique(row).size for row in values)
+    order = max(1, min(ORDER, distinct - 1))
+    low, high = variable.values.min(), variable.values.max()
+    shapes = _legendre(2.0 * (values - low) / (high - low) - 1.0, order)
+    columns = (shapes * carrier.columns).reshape(1, -1, carrier.columns.shape[1])
+    count = carrier.columns.shape[0]
+    subsets = [tuple(range(count * top)) for top in range(1, order)]
+    if count > 1:
+        subsets += [tuple(range(axis, count * order, count)) for axis in range(count)]
+    terms = tuple(
+        Term(f"{variable.name}.{carrier.name}{axis + 1}.P{power}", carrier.unit, carrier.size)
+        for power in range(1, order + 1)
+        for axis in range(count)
+    )
+    name = f"{variable.name} ({carrier.name})"
+    return Candidate(name, terms, columns, subsets=tuple(subsets), channel=variable.name)
+
+
+def _legendre(scaled: Array, order: int) -> Array:
+    """P_1..P_order of values in [-1, 1]: (order, *shape)."""
+    return np.asarray(np.moveaxis(legendre.legvander(scaled, order), -1, 0)[1:], dtype=np.float64)
+
+
+def _levels(variable: Variable, carrier: Carrier) -> Candidate:
+    """A constant for every distinct value (nests, passes)."""
+    levels = np.unique(variable.values)
+    shapes = (variable.values == levels[:, None])[:, None, :]
+    columns = (shapes * carrier.columns).reshape(1, -1, carrier.columns.shape[1])
+    count = carrier.columns.shape[0]
+    terms = tuple(
+        Term(f"{variable.name}.{carrier.name}{axis + 1}.{level:g}", carrier.unit, carrier.size)
+        for level in levels
+        for axis in range(count)
+    )
+    subsets = tuple(
+        tuple(range(count * level, count * (level + 1))) for level in range(levels.size)
+    )
+    name = f"{variable.name} ({carrier.name}, levels)"
+    return Candidate(name, terms, columns, subsets=subsets, channel=variable.name)
+
+
+def _periodic(variable: Variable, carrier: Carrier) -> Candidate:
+    """A sine and a cosine for every direction, at frequencies half an independent one apart."""
+    values = np.broadcast_to(variable.values, carrier.columns.shape)
+    span = float(np.ptp(values, axis=1).max())
+    apart = np.diff(np.unique(variable.values))
+    shortest = variable.shortest or max(2.0 * float(np.median(apart)), span / 100.0)
+    steps = min(MOST_PERIODS, max(2, int(2.0 * span / shortest)))
+    frequencies = np.linspace(1.0 / span, max(1.0 / shortest, 1.5 / span), steps)
+    phase = 2.0 * np.pi * frequencies[:, None, None] * (values - values.min())
+    columns = np.concatenate([np.sin(phase), np.cos(phase)], axis=1)
+    columns *= np.concatenate([carrier.columns, carrier.columns])
+    count = carrier.columns.shape[0]
+    terms = tuple(
+        Term(f"{variable.name}.{carrier.name}{axis + 1}.{wave}", carrier.unit, carrier.size)
+        for wave in ("sin", "cos")
+        for axis in range(count)
+    )
+    subsets = tuple((axis, count + axis) for axis in range(count)) if count > 1 else ()
+    return Candidate(
+        f"{variable.name} ({carrier.name}, periodic)",
+        terms,
+        columns,
+        trials=tuple((float(1.0 / f),) for f in frequencies),
+        subsets=subsets,
+        channel=variable.name,
+    )
