@@ -29,7 +29,7 @@ class Ownership:
     def __init__(self, machine: str, folder: Path | None = None) -> None:
         root = folder or state_folder() / "owners"
         name = hashlib.sha256(machine.encode()).hexdigest()[:16]
-        self._machine = machine
+        self.machine = machine
         self._root = root
         self._lock = root / f"{name}.lock"
         self._note = root / f"{name}.json"
@@ -46,12 +46,12 @@ class Ownership:
         except sqlite3.OperationalError as error:
             held.close()
             raise GateRefused(
-                f"{self._machine} is in use by {self._owner()}",
+                f"{self.machine} is in use by {self._owner()}",
                 remedy="End that session first; one process at a time owns a machine",
             ) from error
         self._held = held
         note = {
-            "machine": self._machine,
+            "machine": self.machine,
             "pid": os.getpid(),
             "host": platform.node(),
             "since": datetime.now(UTC).isoformat(timespec="seconds"),

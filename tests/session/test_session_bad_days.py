@@ -1,0 +1,317 @@
+"""Everything that can go wrong on a measuring day, through the wires: safe, said, nothing lost."""
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from session_mock import POSES, Heard, Mock
+
+from app.errors import GateRefused, StoppedByOperator
+from app.session import PlanOptions, Session, measure_plan
+from app.session import events as ev
+from app.session.ownership import Ownership
+from app.session.plan import Pose
+from drivers.errors import (
+    DeviceError,
+    DriveFault,
+    HeartbeatLost,
+    LinkError,
+    NoTarget,
+    ParameterError,
+)
+
+TWO = {label: POSES[label] for label in "ab"}
+QUICK = PlanOptions(order="pose-by-pose", warm_up=False, two_face=False)
+CARRIED = PlanOptions(order="nest-by-nest", warm_up=False, two_face=False)
+
+
+def begin(
+    mock: Mock,
+    folder: Path,
+    heard: Heard,
+    options: PlanOptions = QUICK,
+    poses: dict[str, Pose] = TWO,
+) -> Session:
+    session = Session.create(
+        mock.site, measure_plan(mock.site, poses, options), folder, unattended=True
+    )
+    session.observers.watch(heard)
+    return session
+
+
+async def run(session: Session) -> int:
+    try:
+        return (await session.run()).readings
+    finally:
+        await session.close()
+
+
+async def resumed(session: Session, heard: Heard | None = None) -> Session:
+    again = Session.reopen(session.folder, unattended=True)
+    if heard is not None:
+        again.observers.watch(heard)
+    return again
+
+
+def when(heard: Heard, session: Session, kind: str, do: Callable[[], Any]) -> None:
+    """Do something once, as soon as a step of a kind begins."""
+    done: list[bool] = []
+
+    def hear(event: ev.Event) -> None:
+        if isinstance(event, ev.StepStarted) and event.kind == kind and not done:
+            done.append(True)
+            do()
+
+    session.observers.watch(hear)
+
+
+def still(mock: Mock) -> bool:
+    return not mock.hands("truth")["moving"]
+
+
+async def test_a_beam_broken_in_the_middle_of_a_dwell_costs_no_reading(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3")
+    session = begin(mock, tmp_path, heard)
+    when(heard, session, "read", lambda: mock.hands("break-next-dwell", at=0.5, for_s=200.0))
+    assert await run(session) == 2 * 3 + 4 + 4
+    assert [event.why for event in heard.of(ev.Suspended)]
+    assert len(heard.of(ev.Released)) == len(heard.of(ev.Suspended))
+    kinds = [kind for _, kind, _ in _notes(session)]
+    assert "reverified" in kinds  # the last good reference was read again
+
+
+async def test_a_beam_that_stays_away_ends_unattended_and_can_be_gone_on_with(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3")
+    session = begin(mock, tmp_path, heard)
+    when(heard, session, "read", lambda: mock.hands("break-beam"))
+    with pytest.raises(DeviceError) as lost:
+        await run(session)
+    assert "beam" in str(lost.value) or isinstance(lost.value, NoTarget)
+    assert heard.of(ev.Fault)[0].safe
+    assert "pkmcal resume" in heard.of(ev.Fault)[0].remedy
+    mock.hands("restore-beam")
+    assert await run(await resumed(session)) == 14
+
+
+async def test_an_smr_in_the_wrong_hole_is_seen_and_carried_again(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "1")
+    session = begin(mock, tmp_path, heard, CARRIED)
+    mock.hands("fault", name="misplace:5")
+    assert await run(session) == 14
+    assert any("nest 3" in a.alarm.device for a in heard.of(ev.AlarmRaised))
+
+
+async def test_an_smr_moved_during_the_pass_is_caught_by_the_next_reading(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "1")
+    session = begin(mock, tmp_path, heard, CARRIED)
+    moves: list[str] = []
+
+    def hear(event: ev.Event) -> None:
+        if isinstance(event, ev.StepStarted) and event.step.endswith("read-b-3"):
+            moves.append(event.step)
+            if len(moves) == 1:
+                mock.hands("carry", smr=1, nest="4", follow=True)
+
+    session.observers.watch(hear)
+    assert await run(session) == 14
+    rejected = heard.of(ev.ReadingRejected)
+    assert "nest 4 where nest 3 was expected" in rejected[0].why
+    assert all(r.miss_mm < 4.0 for r in heard.of(ev.ReadingTaken))
+
+
+async def test_two_smrs_exchanged_do_no_harm_and_an_empty_nest_is_named(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3")
+    session = begin(mock, tmp_path, heard)
+    when(heard, session, "move", lambda: mock.hands("carry", smr=2, nest="birdbath"))
+    with pytest.raises(DeviceError) as empty:
+        await run(session)
+    assert "4" in str(empty.value) or "4" in heard.of(ev.Suspended)[0].why
+
+
+@pytest.mark.parametrize(
+    ("fault", "says"),
+    [
+        ("parameter-corrupt:leg3.B_x", "leg3.B_x"),
+        ("parameter-missing:leg6.L_P", "53"),
+        ("parameter-nan:leg2.L0", "leg2.L0"),
+    ],
+)
+async def test_a_controller_with_other_parameters_never_moves(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path, fault: str, says: str
+) -> None:
+    mock = mock_of("--smrs", "3")
+    mock.hands("fault", name=fault)
+    session = begin(mock, tmp_path, heard)
+    with pytest.raises(ParameterError, match=says):
+        await run(session)
+    assert not heard.of(ev.PoseCommanded)
+    assert heard.of(ev.Fault)[0].remedy
+
+
+@pytest.mark.parametrize(
+    ("fault", "error"),
+    [("drive-fault:3", DriveFault), ("heartbeat-silent:4", HeartbeatLost)],
+)
+async def test_a_drive_that_fails_stops_the_machine_and_the_session_goes_on_later(
+    mock_of: Callable[..., Mock],
+    heard: Heard,
+    tmp_path: Path,
+    fault: str,
+    error: type[DeviceError],
+) -> None:
+    mock = mock_of("--smrs", "3", scale=100)
+    session = begin(mock, tmp_path, heard)
+    when(heard, session, "read", lambda: mock.hands("fault", name=fault))
+    with pytest.raises(error):
+        await run(session)
+    assert still(mock)
+    taken = len(heard.of(ev.ReadingTaken))
+    mock.hands("clear")
+    again = await resumed(session, heard)
+    assert await run(again) == 14
+    assert len(heard.of(ev.ReadingTaken)) == 14 >= taken
+
+
+@pytest.mark.parametrize("which", ["tracker", "can"])
+async def test_a_tcp_reset_ends_safely_and_resumes(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path, which: str
+) -> None:
+    mock = mock_of("--smrs", "3", scale=100)
+    session = begin(mock, tmp_path, heard)
+    when(heard, session, "read", lambda: mock.hands("reset-tcp", of=which))
+    with pytest.raises(LinkError):
+        await run(session)
+    assert heard.of(ev.Fault)
+    await asyncio.sleep(1.5)  # the machine notices that the PC is gone, and stops by itself
+    assert still(mock)
+    assert await run(await resumed(session)) == 14
+
+
+async def test_stop_works_during_a_move(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3", scale=4)
+    session = begin(mock, tmp_path, heard)
+    job = session.start()
+
+    def hear(event: ev.Event) -> None:
+        if isinstance(event, ev.PoseCommanded) and event.pose_label == "a":
+            asyncio.get_running_loop().call_later(0.1, lambda: stops.append(stop()))
+
+    def stop() -> "asyncio.Task[None]":
+        stops_at.append(mock.hands("truth")["moving"])
+        return asyncio.create_task(session.stop())
+
+    stops: list[asyncio.Task[None]] = []
+    stops_at: list[bool] = []
+    session.observers.watch(hear)
+    with pytest.raises(StoppedByOperator, match="pkmcal resume"):
+        await job
+    await session.close()
+    assert stops_at == [True]
+    assert still(mock)
+    assert heard.of(ev.Stopped)
+
+
+async def test_pause_holds_between_steps_and_skip_leaves_one_out(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3", scale=20)
+    session = begin(mock, tmp_path, heard)
+    when(heard, session, "home", session.pause)
+    job = session.start()
+    while not heard.of(ev.Paused):
+        await asyncio.sleep(0.02)
+    await asyncio.sleep(0.5)
+    begun = len(heard.of(ev.StepStarted))
+    await asyncio.sleep(0.5)
+    assert len(heard.of(ev.StepStarted)) == begun
+    done: list[str] = []
+
+    def skip_first_read(event: ev.Event) -> None:
+        if isinstance(event, ev.StepStarted) and event.kind == "read" and not done:
+            done.append(event.step)
+            asyncio.get_running_loop().call_later(0.05, session.skip, "a bird in the beam")
+
+    session.observers.watch(skip_first_read)
+    session.resume()
+    outcome = await job
+    await session.close()
+    assert heard.of(ev.StepSkipped)[0].why == "a bird in the beam"
+    assert outcome.readings == 13
+
+
+async def test_a_pose_out_of_reach_is_refused_before_anything_moves(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3")
+    far = {**TWO, "far": (25.0, 25.0, 240.0, 0.26, 0.26, 0.35)}
+    session = begin(mock, tmp_path, heard, poses=far)
+    with pytest.raises(GateRefused, match="pose far"):
+        await run(session)
+    assert not heard.of(ev.PoseCommanded)
+
+
+async def test_a_machine_in_use_is_refused_naming_the_owner(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3")
+    session = begin(mock, tmp_path, heard)
+    other = Ownership(session.station.owner.machine)
+    other.take()
+    with pytest.raises(GateRefused, match="process"):
+        await run(session)
+    other.release()
+    assert await run(await resumed(session)) == 14
+
+
+async def test_a_tracker_that_forgot_itself_is_initialised_again(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3")
+    session = begin(mock, tmp_path, heard)
+    when(heard, session, "read", lambda: mock.hands("fault", name="tracker-not-initialised"))
+    assert await run(session) == 14
+
+
+async def test_a_knocked_tracker_stand_makes_the_session_begin_anew(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3")
+    session = begin(mock, tmp_path, heard)
+
+    def knock() -> None:
+        mock.hands("jump-tracker", x=0.4, y=-0.3)
+        mock.hands("break-next-dwell", at=0.3, for_s=100.0)
+
+    when(heard, session, "read", knock)
+    assert await run(session) == 14
+    from app.session.journal import Journal
+
+    journal = Journal(session.folder / "journal.sqlite", read_only=True)
+    set_aside = [row for row in journal.rows(good_only=False) if row.status == "invalidated"]
+    journal.close()
+    assert len(set_aside) >= 4
+    assert all("moved" in row.why for row in set_aside)
+
+
+def _notes(session: Session) -> list[tuple[float, str, str]]:
+    from app.session.journal import Journal
+
+    journal = Journal(session.folder / "journal.sqlite", read_only=True)
+    try:
+        return journal.notes()
+    finally:
+        journal.close()

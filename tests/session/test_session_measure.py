@@ -1,0 +1,83 @@
+"""Both orders of a campaign through the wires, and the run that they leave."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from session_mock import POSES, Heard, Mock
+
+from app.run_files import read_run
+from app.session import PlanOptions, Session, measure_plan
+from app.session import events as ev
+from app.session.plans import Order
+from calib.identify import fit
+from calib.model import Model
+from calib.runs.stack import stack
+
+OPTIONS = PlanOptions(reference_every=3, warm_up=False)
+
+
+@pytest.mark.parametrize(
+    ("order", "smrs", "moves"), [("nest-by-nest", "1", 18), ("pose-by-pose", "3", 6)]
+)
+async def test_a_campaign_leaves_a_run_that_loads_and_fits(
+    mock_of: Callable[..., Mock],
+    heard: Heard,
+    tmp_path: Path,
+    order: Order,
+    smrs: str,
+    moves: int,
+) -> None:
+    mock = mock_of("--smrs", smrs, "--seed", "4")
+    options = PlanOptions(order=order, reference_every=3, warm_up=False)
+    session = Session.create(
+        mock.site, measure_plan(mock.site, POSES, options), tmp_path, unattended=True
+    )
+    session.observers.watch(heard)
+    try:
+        outcome = await session.run()
+    finally:
+        await session.close()
+    platform = [r for r in heard.of(ev.ReadingTaken) if r.pose_label]
+    assert len(platform) == 18
+    assert len([m for m in heard.of(ev.PoseCommanded) if m.pose_label != "home"]) >= moves
+    loaded = read_run(outcome.run_folder)
+    assert loaded.run.header.controller_parameters["leg1.L0"] == 230.715
+    found = fit(Model(stack(loaded.machine, [loaded.run]), []))
+    assert found.readings == outcome.readings == sum(bool(nest) for nest in loaded.run.nest)
+    assert 0.4 < found.chi2_per_dof < 2.5
+
+
+async def test_base_nests_without_their_own_smrs_are_visited_with_the_one(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "1", "--no-base-smrs")
+    poses = {label: POSES[label] for label in "ab"}
+    session = Session.create(
+        mock.site, measure_plan(mock.site, poses, OPTIONS), tmp_path, unattended=True
+    )
+    try:
+        outcome = await session.run()
+    finally:
+        await session.close()
+    assert outcome.readings == 2 * 3 + 4 * 3  # start, after the third pose, end
+
+
+async def test_a_repeated_pose_carries_its_cycle(
+    mock_of: Callable[..., Mock], tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3")
+    options = PlanOptions(order="pose-by-pose", cycles=2, warm_up=False, two_face=False)
+    poses = {label: POSES[label] for label in "ab"}
+    session = Session.create(
+        mock.site, measure_plan(mock.site, poses, options), tmp_path, unattended=True
+    )
+    try:
+        outcome = await session.run()
+    finally:
+        await session.close()
+    text = (outcome.run_folder / "points.csv").read_text(encoding="utf-8")
+    header = text.splitlines()[0].split(",")
+    column = header.index("cycle")
+    cycles = [line.split(",")[column] for line in text.splitlines()[1:]]
+    assert cycles.count("1") == cycles.count("2") == 6
