@@ -8,12 +8,12 @@ from app.errors import GateRefused
 from app.session.plan import Plan, Pose
 from app.session.work import HOME
 from calib.mechanism.description import Machine
-from calib.mechanism.limits import violations
+from calib.mechanism.limits import Violation, violations
 from calib.mechanism.rigid import Poses
-from calib.mechanism.solve import inverse
+from calib.mechanism.solve import forward, inverse
 
 BETWEEN = 8
-"""Poses looked at from one waypoint to the next, the arrival included."""
+"""Parts into which the way from one waypoint to the next is cut to look at it."""
 
 
 def waypoints(plan: Plan) -> list[str]:
@@ -33,36 +33,41 @@ def check_waypoints(
     path: Sequence[Pose],
     labels: Sequence[str],
 ) -> float:
-    """Check poses and the straight way between them with the controller's own parameters.
+    """Check poses and the ways between them with the controller's own parameters.
 
-    Returns the smallest distance to an actuator limit over the path, in the actuators' unit.
+    A controller moves its actuators together and linearly, so a way is straight in actuator
+    space. Returns the smallest distance to an actuator limit over the path, in its unit.
 
     Raises
     ------
     GateRefused
         Naming the first pose that passes a limit, which one, and by how much.
     """
-    ends = np.array(path, float).T
-    share = np.arange(1, BETWEEN + 1) / BETWEEN
-    ways = ends[:, :-1, None] + (ends[:, 1:] - ends[:, :-1])[:, :, None] * share
-    poses = np.concatenate([ends[:, :1], ways.reshape(6, -1)], axis=1)
     geometry = {name: v for name, v in controller.items() if name in machine.parameter_index}
-    found = inverse(machine, Poses.from_xyz_rpy(poses), machine.vector(geometry))
-    for violation in violations(machine, found, geometry):
-        leg, part = divmod(max(violation.pose - 1, 0), BETWEEN)
-        at_pose = violation.pose == 0 or part == BETWEEN - 1
-        end = labels[leg + 1] if violation.pose else labels[0]
-        where = f"pose {end}" if at_pose else f"the way from pose {labels[leg]} to pose {end}"
-        raise GateRefused(
-            f"{where} passes a limit: {violation.what}"
-            + (
-                f" = {violation.value:.3f} {violation.unit}, allowed "
-                f"{violation.low:.3f}..{violation.high:.3f}"
-                if np.isfinite(violation.value)
-                else ""
-            ),
-            remedy="Leave that pose out or choose poses with pkmcal poses; nothing has moved",
-        )
-    q = machine.coordinates(found.extension, geometry)
+    parameters = machine.vector(geometry)
+    ends = inverse(machine, Poses.from_xyz_rpy(np.array(path, float).T), parameters)
+    for violation in violations(machine, ends, geometry):
+        raise _refusal(f"pose {labels[violation.pose]}", violation)
+    s = ends.extension
+    share = np.arange(1, BETWEEN) / BETWEEN
+    between = s[:, :-1, None] + (s[:, 1:] - s[:, :-1])[:, :, None] * share
+    ways = forward(machine, between.reshape(len(s), -1), parameters)
+    for violation in violations(machine, ways, geometry):
+        leg = violation.pose // len(share)
+        raise _refusal(f"the way from pose {labels[leg]} to pose {labels[leg + 1]}", violation)
+    q = machine.coordinates(np.concatenate([s, ways.extension], axis=1), geometry)
     low, high = machine.q_limits.T
     return float(np.min(np.minimum(q - low[:, None], high[:, None] - q)))
+
+
+def _refusal(where: str, violation: Violation) -> GateRefused:
+    value = (
+        f" = {violation.value:.3f} {violation.unit}, allowed "
+        f"{violation.low:.3f}..{violation.high:.3f}"
+        if np.isfinite(violation.value)
+        else ""
+    )
+    return GateRefused(
+        f"{where} passes a limit: {violation.what}{value}",
+        remedy="Leave that pose out or choose poses with pkmcal poses; nothing has moved",
+    )
