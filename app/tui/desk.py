@@ -8,22 +8,31 @@ import asyncio
 import contextlib
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Coroutine, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from app.errors import GateRefused, StoppedByOperator
+from app.model_files import write_model
+from app.session import events as ev
 from app.session.events import DeviceStates
 from app.session.plan import Plan
 from app.session.session import Outcome, Session
 from app.session.station import Station
 from app.site import Site, load_site, site_of_mock
+from app.tui.analysis import FitAnswer, identify, runs_under
+from app.tui.correction import KEEP, Corrections
 from app.tui.picture import Picture
+from app.tui.verifying import Verified, verification_plan, verified
+from calib.errors import BadInput
 from drivers.errors import ConnectFailed, DeviceError, Silence
 
+_Answer = TypeVar("_Answer")
 MOCK_START_S = 30.0
 MOCK_END_S = 5.0
 POLL_S = 0.5
+ENDS = (StoppedByOperator, GateRefused, DeviceError)
+"""How a job ends early."""
 
 
 class Desk:
@@ -43,8 +52,14 @@ class Desk:
         self.session: Session | None = None
         self.mock: asyncio.subprocess.Process | None = None
         self._mock_log: asyncio.Task[None] | None = None
-        self._job: asyncio.Task[Outcome] | None = None
+        self._job: asyncio.Task[Any] | None = None
+        self.corrections = Corrections(self)
         self._connecting = False
+        self.chosen_runs: tuple[str, ...] = ()
+        self.effects: tuple[str, ...] = ()
+        self.answer_fit: FitAnswer | None = None
+        self.before: Verified | None = None
+        self.after: Verified | None = None
 
     # site and mock
 
@@ -58,7 +73,7 @@ class Desk:
         await self.disconnect()
         self.site = site
         self.station = Station(site)
-        self.station.observers.watch(self.picture.tell)
+        self.station.observers.watch(self._hear)
         self.picture.write(f"site {site.title or site.source}")
 
     async def start_mock(self, arguments: Sequence[str] = ("hexapod",)) -> None:
@@ -160,7 +175,7 @@ class Desk:
 
     async def clear_faults(self) -> None:
         """Reset standing faults of the drives; they stay without power."""
-        station = self._idle_station("clear faults")
+        station = self.idle_station("clear faults")
         await station.controller.clear_faults()
         self.picture.trouble = None
         self.picture.write("faults cleared; drives are off", "good")
@@ -168,7 +183,7 @@ class Desk:
 
     async def power(self, on: bool) -> None:
         """Switch the drives on or off."""
-        station = self._idle_station("switch the drives")
+        station = self.idle_station("switch the drives")
         await (station.controller.enable() if on else station.controller.disable())
         await station.poll()
 
@@ -181,12 +196,34 @@ class Desk:
 
     async def run(self, plan: Plan) -> Outcome:
         """Begin a session with this plan and run it to its end; raises what ended it early."""
-        station = self._idle_station("begin")
+        station = self.idle_station("begin")
         return await self._run(Session.create(station.site, plan, self.root, station=station))
+
+    def _hear(self, event: ev.Event) -> None:
+        """Take an event of the station; a write-back begins sessions of its own."""
+        inner = self.corrections.session
+        if inner is not None and inner is not self.session:
+            self.session = inner
+            self.picture.begin(inner)
+        self.picture.tell(event)
+        if self.corrections.running is not None and isinstance(event, ev.Finished):
+            self.picture.run = "running"  # the check poses are done, the write-back is not
+
+    async def as_job(self, work: Coroutine[Any, Any, _Answer]) -> _Answer:
+        """Run something as the one job that the stop key stops."""
+        self.session = None
+        job = asyncio.create_task(work, name="job")
+        self._job = job
+        try:
+            return await job
+        except asyncio.CancelledError:
+            if job.cancelled():
+                raise StoppedByOperator from None
+            raise
 
     async def go_on(self, folder: Path) -> Outcome:
         """Go on with a session that ended early."""
-        station = self._idle_station("go on")
+        station = self.idle_station("go on")
         return await self._run(Session.reopen(folder, station=station))
 
     async def _run(self, session: Session) -> Outcome:
@@ -196,13 +233,72 @@ class Desk:
         await asyncio.sleep(0)  # the session recalls from its journal where the base is
         self.picture.recall(session)
         try:
-            return await self._job
-        except (StoppedByOperator, GateRefused, DeviceError) as end:
+            outcome = await self._job
+        except ENDS as end:
             if self.picture.busy:  # nobody told yet how it ended
                 self.picture.run = "stopped" if isinstance(end, StoppedByOperator) else "fault"
             raise
         finally:
             session.journal.close()
+        if session.plan.purpose == "verify":
+            await self._judge(outcome.folder)
+        elif session.plan.purpose == "measure":
+            self.chosen_runs = (str(outcome.run_folder),)
+        return outcome
+
+    # what was measured
+
+    async def identify(self) -> None:
+        """Fit the chosen runs, or the latest; raises :class:`BadInput`."""
+        runs = self.chosen_runs
+        if not runs:
+            latest = runs_under(self.root)
+            if not latest:
+                raise BadInput("there is no run yet", remedy="Measure one, or choose a folder (o)")
+            runs = (str(latest[0]),)
+        # Arithmetic goes beside the event loop: stop key and drivers must not wait for it.
+        answer = await asyncio.to_thread(identify, runs, self.effects)
+        self.chosen_runs, self.answer_fit = runs, answer
+        report = answer.report
+        self.picture.write(
+            f"fitted {report['readings']} readings: RMS {answer.before_um:.1f} -> "
+            f"{report['rms_um']:.1f} um, floor {report['noise_floor_um']:.1f}",
+            "good",
+        )
+
+    async def save_model(self, path: Path) -> None:
+        """Write the fitted model to a file."""
+        if self.answer_fit is None:
+            raise BadInput("nothing is fitted yet", remedy="Fit a run first (f)")
+        write_model(path, self.answer_fit.fit)
+        self.picture.write(f"model written to {path}", "good")
+
+    # what it is worth
+
+    async def verify(self, quick: bool) -> None:
+        """Measure the verification poses and judge them."""
+        site = self.idle_station("verify").site
+        await self.run(await verification_plan(site, quick))
+
+    async def _judge(self, folder: Path) -> None:
+        """Judge a finished verification; the last one before it becomes 'before'."""
+        judged = await asyncio.to_thread(verified, folder)
+        if self.after is not None:
+            self.before = self.after
+        self.after = judged
+        found = judged.found.measured
+        self.picture.write(
+            f"verified {len(judged.found.labels)} poses: peak {found.position_peak_um:.1f} um, "
+            f"{found.orientation_peak_deg:.4f} deg",
+            "good",
+        )
+
+    async def load_before(self, folder: Path) -> None:
+        """Let an earlier verification stand as 'before'."""
+        self.before = await asyncio.to_thread(verified, folder)
+        self.picture.write(f"before: {folder.name}")
+
+    # the operator's keys
 
     def pause_or_resume(self) -> None:
         """Hold after the step in work, or go on."""
@@ -217,14 +313,27 @@ class Desk:
         self._running_session().skip("left out by the operator")
 
     def answer(self, prompt: str, choice: str) -> None:
-        """Answer the session's question."""
-        self._running_session().answer_prompt(prompt, choice)
+        """Answer the job's question."""
+        if prompt == KEEP:
+            self.corrections.answer(choice)
+        else:
+            self._running_session().answer_prompt(prompt, choice)
 
     async def stop(self) -> str:
         """Stop whatever moves, at any moment. Returns what was done, in words."""
-        if self.busy and self.session is not None:
+        write_back = self.corrections.running
+        if self.busy and write_back is not None and write_back.running is not None:
+            await write_back.stop()
+            return "stopped; the earlier parameters are being put back"
+        if self.busy and write_back is None and self.session is not None:
             await self.session.stop()
             return "stopped; the machine stands still"
+        halted = await self._halt()
+        if self._job is not None and self.corrections.may_be_cancelled:
+            self._job.cancel()  # it puts back by itself what it has changed
+        return halted
+
+    async def _halt(self) -> str:
         if self.connected and self.station is not None:
             confirmed = await self.station.safe_stop()
             return "all motion stopped" if confirmed else "STOP NOT CONFIRMED: use the e-stop"
@@ -232,9 +341,9 @@ class Desk:
 
     async def close(self) -> None:
         """End everything that was begun here."""
-        if self.busy and self.session is not None and self._job is not None:
-            await self.session.stop()
-            with contextlib.suppress(StoppedByOperator, DeviceError, asyncio.CancelledError):
+        if self.busy and self._job is not None:
+            await self.stop()
+            with contextlib.suppress(*ENDS, asyncio.CancelledError):
                 await self._job
         if self.station is not None:
             await self.station.close()
@@ -249,11 +358,8 @@ class Desk:
             )
         return self.station
 
-    def check_idle(self, wish: str) -> None:
-        """Raise what stands against beginning a job: nothing connected, or a job that runs."""
-        self._idle_station(wish)
-
-    def _idle_station(self, wish: str) -> Station:
+    def idle_station(self, wish: str) -> Station:
+        """The connected station while no job runs; raises what stands against it."""
         station = self._need_station()
         if not station.connected:
             raise ConnectFailed(
@@ -271,25 +377,3 @@ class Desk:
         if self.session is None or not self.busy:
             raise GateRefused("no job runs", remedy="Start one on the Measure screen")
         return self.session
-
-
-def said(error: Exception) -> tuple[str, str]:
-    """Split an error of ours into what happened and what to do."""
-    what = str(getattr(error, "what", "") or error)
-    device = str(getattr(error, "device", ""))
-    place = str(getattr(error, "place", ""))
-    where = device or place
-    remedy = str(getattr(error, "remedy", ""))
-    return (f"{where}: {what}" if where else what), remedy
-
-
-def channel_text(channels: Mapping[str, Any]) -> str:
-    """Render a machine's channels: ``structure_temp_C`` becomes ``structure temp 20.13 C``."""
-    units = {"C": "C", "kg": "kg", "hPa": "hPa", "s": "s", "mm": "mm"}
-    parts = []
-    for name, value in channels.items():
-        *words, last = name.split("_")
-        unit = units.get(last, "")
-        label = " ".join(words if unit else [*words, last])
-        parts.append(f"{label} {value:.2f} {unit}".rstrip())
-    return "   ".join(parts)

@@ -11,10 +11,10 @@ from textual.widgets import Static
 
 from app.session.events import Connected
 from app.site import Site
-from app.tui.desk import channel_text
 from app.tui.dialogs import Choose, Enter, Pick, site_candidates
 from app.tui.face import Face
 from app.tui.picture import Picture
+from app.tui.wording import channel_text
 from drivers.interface import ActuatorState, ControllerState, TrackerState
 
 

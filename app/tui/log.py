@@ -25,6 +25,7 @@ class LogFace(Face):
         "Arrows and page keys scroll; end follows the newest line again. The journal in the "
         "session's folder keeps it for good."
     )
+    AUTO_FOCUS: ClassVar[str | None] = "#log"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("w", "warnings", "Warnings only", tooltip="Show warnings and faults only, or all"),
     ]

@@ -81,7 +81,7 @@ class MeasureFace(Face):
         self.app.push_screen(NewRun(site), chosen)
 
     async def _refuse(self) -> None:
-        self.desk.check_idle("start a run")
+        self.desk.idle_station("start a run")
 
     async def _measure(self, site: Site, wish: RunWish) -> None:
         await self.desk.run(await plan_for(site, wish))
@@ -118,12 +118,16 @@ class MeasureFace(Face):
 
 
 def unfinished(root: Path) -> list[Path]:
-    """Sessions under ``root`` that have a journal but no exported run; newest first."""
+    """Sessions under ``root`` that have a journal but no exported run; newest first.
+
+    Check poses of a write-back are not among them: what they were to check has been put back.
+    """
     return sorted(
         (
             journal.parent
             for journal in root.glob("*/journal.sqlite")
-            if not (journal.parent / "run" / "run.toml").is_file()
+            if not journal.parent.name.rstrip("-0123456789").endswith("-check")
+            and not (journal.parent / "run" / "run.toml").is_file()
         ),
         reverse=True,
     )

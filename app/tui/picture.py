@@ -332,8 +332,6 @@ def _gate(picture: Picture, event: ev.GateChecked) -> None:
 
 
 def _stage(picture: Picture, event: ev.WriteBackStage) -> None:
-    if event.stage == "snapshot":
-        picture.gates, picture.stages = [], []
     picture.stages.append(event)
     bad = event.stage == "restore-failed"
     picture.write(f"write-back: {event.says}", "bad" if bad else "info")

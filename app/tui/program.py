@@ -9,18 +9,22 @@ from textual.binding import Binding, BindingType
 from textual.screen import Screen
 
 from app.errors import GateRefused, StoppedByOperator
-from app.tui.desk import POLL_S, Desk, said
+from app.tui.apply import ApplyFace
+from app.tui.desk import POLL_S, Desk
 from app.tui.devices import DevicesFace
 from app.tui.dialogs import Ask, Choose, Help
 from app.tui.face import Face
+from app.tui.fit import FitFace
 from app.tui.log import LogFace
 from app.tui.measure import MeasureFace
 from app.tui.theme import BENCH
+from app.tui.verify import VerifyFace
 from app.tui.widgets.frame import STOP_KEY
+from app.tui.wording import said
 from calib.errors import BadInput
 from drivers.errors import DeviceError
 
-FACES: tuple[type[Face], ...] = (DevicesFace, MeasureFace, LogFace)
+FACES: tuple[type[Face], ...] = (DevicesFace, MeasureFace, FitFace, ApplyFace, VerifyFace, LogFace)
 FORESEEN = (BadInput, DeviceError, GateRefused, OSError)
 
 

@@ -93,7 +93,7 @@ class ScatterPlot(QuietPlot):
 class PairPlot(QuietPlot):
     """Two or three series over one axis, as markers."""
 
-    def show(self, series: Mapping[str, tuple[Array, Array]], xlabel: str, key: object) -> None:
+    def show(self, series: Mapping[str, tuple[Array, Array]], key: object) -> None:
         """Draw named series of x and y."""
         if not self.changed(key):
             return

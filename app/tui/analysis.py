@@ -1,0 +1,50 @@
+"""What the Fit screen shows: a fit, and how far the readings were off before it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.analysis import load_rows
+from calib.arrays import Array
+from calib.identify import Fit, fit, fit_report
+from calib.identify.fitting import begin
+from calib.model import Model
+
+
+@dataclass(frozen=True, eq=False)
+class FitAnswer:
+    """A fit with its report (``pkm-fit/1``).
+
+    ``miss_before`` and ``miss_after`` (N,) are 3D distances in mm of the accepted readings from
+    the drawing's machine (only the tracker's place fitted) and from the fitted one.
+    """
+
+    runs: tuple[str, ...]
+    effects: tuple[str, ...]
+    fit: Fit
+    report: dict[str, Any]
+    miss_before: Array
+    miss_after: Array
+
+    @property
+    def before_um(self) -> float:
+        """RMS of the 3D distance for the drawing's machine, in the same readings."""
+        return 1000.0 * float(np.sqrt(np.mean(self.miss_before**2)))
+
+
+def identify(runs: tuple[str, ...], effects: tuple[str, ...] = ()) -> FitAnswer:
+    """Read runs and fit them; raises :class:`calib.errors.BadInput`."""
+    rows, chosen = load_rows(runs, effects)
+    model = Model(rows, chosen)
+    found = fit(model)
+    nominal, _ = begin(model, found.accepted)
+    before = np.linalg.norm(nominal.residual[:, found.accepted], axis=0)
+    after = np.linalg.norm(found.linear.residual[:, found.accepted], axis=0)
+    return FitAnswer(runs, effects, found, fit_report(found), before, after)
+
+
+def runs_under(root: Path) -> list[Path]:
+    """Run folders of the sessions under ``root``, newest first."""
+    return sorted((path.parent for path in root.glob("*/run/run.toml")), reverse=True)

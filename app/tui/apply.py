@@ -1,0 +1,207 @@
+"""Apply: what would be written, what the gates say, write and try, keep or put back, undo."""
+
+from functools import partial
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal, Vertical
+from textual.content import Content
+from textual.widgets import DataTable, Static
+
+from app.session.events import GateChecked
+from app.session.known import Snapshot
+from app.tui.correction import Comparison
+from app.tui.dialogs import Choose, Pick
+from app.tui.face import Face
+from app.tui.picture import Picture
+
+
+class ApplyFace(Face):
+    """Writing corrections to the controller, with the way back always open."""
+
+    mode = "apply"
+    label = "Apply"
+    about = (
+        "c compares the fit with what the controller holds and asks the gates; nothing is written. "
+        "a writes to volatile memory, reads back bit for bit, measures check poses before and "
+        "after, asks you, and only then stores. Any failure, and the stop key, puts the earlier "
+        "set back. u brings back any earlier set. t takes what the controller holds as known, "
+        "where it is not what this program left there."
+    )
+    AUTO_FOCUS: ClassVar[str | None] = "#apply-table"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("c", "compare", "Compare", tooltip="Compare fit and controller; ask the gates"),
+        Binding("a", "apply", "Apply", tooltip="Write, try on check poses, then keep or put back"),
+        Binding("u", "undo", "Undo", tooltip="Bring back an earlier parameter set"),
+        Binding("t", "accept", "Take as known", tooltip="Accept what the controller holds now"),
+    ]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._drawn: tuple[object, ...] | None = None
+
+    def body(self) -> ComposeResult:
+        """Changes to the left; gates, stages and snapshots to the right."""
+        with Horizontal(id="apply"):
+            yield DataTable(
+                id="apply-table", cursor_type="row", zebra_stripes=True, cell_padding=0
+            )
+            with Vertical(id="apply-right"):
+                yield Static(id="apply-gates", classes="panel")
+                yield Static(id="apply-stages", classes="panel")
+                yield Static(id="apply-sets", classes="panel")
+
+    def on_mount(self) -> None:
+        """Name the panels."""
+        for name, title in (
+            ("table", "Old and new"), ("gates", "Gates"), ("stages", "Write-back"),
+            ("sets", "Parameter sets"),
+        ):  # fmt: skip
+            self.query_one(f"#apply-{name}").border_title = title
+
+    def show(self, picture: Picture) -> None:
+        """Draw table, gates and stages."""
+        corrections = self.desk.corrections
+        comparison = corrections.comparison
+        self.query_one("#apply-gates", Static).update(gates_text(picture.gates, self.wide))
+        stages = self.query_one("#apply-stages", Static)
+        stages.update(stages_text(picture, stages.content_size.height or 6))
+        self.query_one("#apply-sets", Static).update(sets_text(corrections.snapshots))
+        drawn = (comparison, self.wide, self.desk.answer_fit)
+        if drawn != self._drawn:
+            self._drawn = drawn
+            self._fill(comparison)
+
+    def _fill(self, comparison: Comparison | None) -> None:
+        table = self.query_one("#apply-table", DataTable)
+        table.clear(columns=True)
+        table.border_subtitle = ""
+        if comparison is None:
+            fitted = self.desk.answer_fit is not None
+            table.add_column("")
+            table.add_row("c compares the fit with the controller" if fitted
+                          else "Nothing is fitted yet: go to Fit (3)")  # fmt: skip
+            return
+        names = ("old", "new", "change", "sigmas")
+        table.add_columns("parameter", *(Text(name, justify="right") for name in names))
+        for change in comparison.proposal.changes:
+            digits = 4 if change.unit == "mm" else 6
+            cells = (
+                f"{change.old:10.{digits}f}", f"{change.new:10.{digits}f}",
+                f"{change.new - change.old:+9.{digits}f}", f"{change.in_sigmas:+7.1f}",
+            )  # fmt: skip
+            style = "" if change.identified else "dim"
+            table.add_row(
+                Text(change.name, style), *(Text(cell, style, justify="right") for cell in cells)
+            )
+        for name, why in comparison.proposal.left_out.items():
+            table.add_row(Text(name, "#e8b45a"), Text("not written:"), Text(why))
+        count = len(comparison.proposal.changes)
+        table.border_subtitle = f"{count} values; a writes them"
+
+    # keys
+
+    def action_compare(self) -> None:
+        """Compare."""
+        self.act(self.desk.corrections.compare, busy="comparing fit and controller ...")
+
+    def action_apply(self) -> None:
+        """Ask once more, then write."""
+        comparison = self.desk.corrections.comparison
+        if comparison is None or not comparison.passed:
+            self.act(self._refuse)
+            return
+
+        def sure(answer: str | None) -> None:
+            if answer == "apply":
+                self.act(self.desk.corrections.apply, busy="write-back begins ...")
+
+        text = (
+            f"{len(comparison.proposal.changes)} values go to volatile memory, the machine visits "
+            "the check poses twice, and you are asked again before anything is kept. Nobody in "
+            "the machine?"
+        )
+        self.app.push_screen(Choose("Apply?", text, ("apply", "not now"), first="not now"), sure)
+
+    async def _refuse(self) -> None:
+        await self.desk.corrections.refuse()
+
+    def action_undo(self) -> None:
+        """Choose an earlier set and bring it back."""
+
+        async def look() -> None:
+            station = self.desk.idle_station("undo")
+            self.desk.corrections.list_snapshots(station)
+            sets = self.desk.corrections.snapshots
+            if not sets:
+                self.notify("There is no earlier set of this controller.")
+                return
+            options = [(str(each.number), set_line(each)) for each in reversed(sets)]
+            self.app.push_screen(
+                Pick("Undo", "Which set is to be brought back, for good?", options), picked
+            )
+
+        def picked(answer: str | None) -> None:
+            for snapshot in self.desk.corrections.snapshots:
+                if answer == str(snapshot.number):
+                    self.act(partial(self.desk.corrections.undo, snapshot))
+
+        self.act(look)
+
+    def action_accept(self) -> None:
+        """Ask, then accept."""
+
+        def sure(answer: str | None) -> None:
+            if answer == "take as known":
+                self.act(self.desk.corrections.accept)
+
+        text = (
+            "The controller's parameters become the known ones, whatever they are. Do this only "
+            "if you know who wrote them."
+        )
+        choices = ("take as known", "leave")
+        self.app.push_screen(Choose("Take as known?", text, choices, first="leave"), sure)
+
+
+def gates_text(gates: list[GateChecked], wide: bool) -> Content:
+    """Each gate with its value against its limit."""
+    if not gates:
+        return Content.from_markup("[dim]not asked yet[/]")
+    lines = []
+    for gate in gates:
+        sign, style = ("✓", "$success") if gate.passed else ("✗", "bold $error")
+        if wide:
+            lines.append(Content.assemble((f"{sign} ", style), gate.says))
+        else:
+            numbers = f"{gate.value:6.3g} ≤ {gate.limit:g} {gate.unit}"
+            lines.append(Content.assemble((f"{sign} ", style), f"{gate.gate:<11} {numbers}"))
+    return Content("\n").join(lines)
+
+
+def stages_text(picture: Picture, most: int) -> Content:
+    """The stages so far; the last one is the present one while the job runs."""
+    if not picture.stages:
+        return Content.from_markup("[dim]nothing written[/]")
+    lines = []
+    for number, stage in enumerate(picture.stages):
+        last = number == len(picture.stages) - 1
+        bad = stage.stage in ("restore", "restore-failed")
+        sign = "✗" if bad else "▶" if last and picture.busy else "✓"
+        style = "bold $error" if bad else "$accent" if sign == "▶" else "$success"
+        lines.append(Content.assemble((f"{sign} ", style), stage.says))
+    return Content("\n").join(lines[-max(most, 3) :])
+
+
+def sets_text(snapshots: tuple[Snapshot, ...]) -> Content:
+    """The latest parameter sets, newest first."""
+    if not snapshots:
+        return Content.from_markup("[dim]none yet[/]")
+    return Content("\n").join(Content(set_line(each)) for each in reversed(snapshots[-12:]))
+
+
+def set_line(snapshot: Snapshot) -> str:
+    """One parameter set in a line."""
+    when = snapshot.taken_utc.replace("T", " ").removesuffix("+00:00")
+    return f"{snapshot.number:>3}  {when}  {snapshot.why}"

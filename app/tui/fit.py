@@ -1,0 +1,242 @@
+"""Fit: identify the parameters from a run, see what they are worth and what stays open."""
+
+import shlex
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.content import Content
+from textual.widgets import DataTable, Static
+
+from app.tui.analysis import FitAnswer, runs_under
+from app.tui.dialogs import Enter, Pick
+from app.tui.face import Face
+from app.tui.picture import Picture
+from app.tui.widgets.plots import PairPlot
+
+
+class FitFace(Face):
+    """What the readings say about the machine."""
+
+    mode = "fit"
+    label = "Fit"
+    about = (
+        "f fits the latest run. The RMS should fall to the floor, which is what a perfect model "
+        "would leave; chi-square per degree of freedom should be near 1. Held-out poses tell what "
+        "the model is worth where nothing was measured. 'open' marks a parameter that these "
+        "readings do not determine: it stays near its drawing value and does no harm. tab goes "
+        "into the table, arrows scroll it."
+    )
+    AUTO_FOCUS: ClassVar[str | None] = "#fit-table"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("f", "fit", "Fit", tooltip="Fit the run that is chosen, or the latest"),
+        Binding("o", "choose", "Choose run", tooltip="Choose or type the runs to fit"),
+        Binding("s", "save", "Save model", tooltip="Write what was found to a model file"),
+    ]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._drawn: FitAnswer | None = None
+
+    def body(self) -> ComposeResult:
+        """Summary to the left, parameters to the right."""
+        with Horizontal(id="fit"):
+            with Vertical(id="fit-left"):
+                yield Static(id="fit-summary", classes="panel")
+                with VerticalScroll(id="fit-open", classes="panel"):
+                    yield Static(id="fit-words")
+            with Vertical(id="fit-right"):
+                yield DataTable(id="fit-table", cursor_type="row", zebra_stripes=True)
+                yield PairPlot("Readings: distance from the model, µm", id="fit-plot")
+
+    def on_mount(self) -> None:
+        """Name the panels."""
+        self.query_one("#fit-summary").border_title = "Fit"
+        self.query_one("#fit-open").border_title = "What to know"
+        self.query_one("#fit-table").border_title = "Parameters"
+
+    def show(self, picture: Picture) -> None:
+        """Draw the answer; the table only when it is another one."""
+        answer = self.desk.answer_fit
+        self.query_one("#fit-summary", Static).update(summary(answer, self.desk.chosen_runs))
+        if answer is self._drawn:
+            return
+        self._drawn = answer
+        self.query_one("#fit-words", Static).update(words(answer))
+        if answer is not None:
+            self._fill(answer)
+            numbers = np.arange(1.0, len(answer.miss_before) + 1.0)
+            self.query_one(PairPlot).show(
+                {
+                    "drawing": (numbers, answer.miss_before * 1000.0),
+                    "fitted": (numbers, answer.miss_after * 1000.0),
+                },
+                id(answer),
+            )
+
+    def on_resize(self) -> None:
+        """Columns depend on the width."""
+        if self._drawn is not None:
+            self._fill(self._drawn)
+
+    def _fill(self, answer: FitAnswer) -> None:
+        table = self.query_one("#fit-table", DataTable)
+        table.clear(columns=True)
+        value = ("value",) if self.wide else ()
+        names = (*value, "change", "±", "sigmas")
+        table.add_columns("parameter", *(Text(name, justify="right") for name in names), "")
+        rows = [parameter_row(entry, self.wide) for entry in answer.report["parameters"]]
+        table.add_rows(rows)
+        known = sum(entry["identified"] for entry in answer.report["parameters"])
+        table.border_subtitle = f"{known} of {len(rows)} determined; mm, rad"
+
+    # keys
+
+    def action_fit(self) -> None:
+        """Fit."""
+        self.act(self.desk.identify, busy="fitting ...")
+
+    def action_choose(self) -> None:
+        """Choose a run of the sessions, or type folders."""
+        found = [(str(folder), folder.parent.name) for folder in runs_under(self.desk.root)]
+        if not found:
+            self._type_runs()
+            return
+
+        def picked(answer: str | None) -> None:
+            if answer:
+                self._fit_runs((answer,))
+            elif answer == "":
+                self._type_runs()
+
+        options = [*found, ("", "other runs: type their folders")]
+        self.app.push_screen(Pick("Choose run", "Runs of sessions, newest first", options), picked)
+
+    def _type_runs(self) -> None:
+        def entered(answer: str | None) -> None:
+            if answer:
+                self._fit_runs(tuple(shlex.split(answer)))
+
+        text = "Folders of the runs; several, with blanks between them, are fitted together"
+        self.app.push_screen(Enter("Runs to fit", text), entered)
+
+    def _fit_runs(self, runs: tuple[str, ...]) -> None:
+        self.desk.chosen_runs = runs
+        self.action_fit()
+
+    def action_save(self) -> None:
+        """Write a model file."""
+
+        def entered(answer: str | None) -> None:
+            if answer:
+                self.act(lambda: self.desk.save_model(Path(answer)))
+
+        self.app.push_screen(
+            Enter("Save model", "File for the effects and parameters found", "model.toml"), entered
+        )
+
+
+def summary(answer: FitAnswer | None, runs: tuple[str, ...]) -> Content:
+    """Before and after, in a few lines that keep their places."""
+    if answer is None:
+        which = f"Run: {_short(runs)}\n" if runs else ""
+        return Content.from_markup(
+            which + "[bold $accent]f[/] fits the latest run\n[bold $accent]o[/] chooses another"
+        )
+    report = answer.report
+    effects = ", ".join(report["effects"]) or "geometry only"
+    bad = len(report["bad_readings"])
+    lines = [
+        Content.assemble(("run      ", "dim"), _short(answer.runs)),
+        Content.assemble(("model    ", "dim"), effects),
+        Content.assemble(("readings ", "dim"), f"{report['readings']}, {bad} excluded"),
+        Content.from_markup("[dim]RMS, µm            floor[/]"),
+        Content(f"drawing {answer.before_um:9.1f}"),
+        Content.assemble(
+            "fitted  ", (f"{report['rms_um']:9.1f}", "bold"), f" {report['noise_floor_um']:6.1f}"
+        ),
+        Content.assemble(
+            "held out", (_number(report["holdout_rms_um"], 9), "bold"),
+            f" {_number(report['holdout_floor_um'], 6)}",
+        ),
+        Content.assemble(
+            "chi²/dof", (_number(report["chi2_per_dof"], 9, 2), "bold"), f"  {verdict(report)}"
+        ),
+    ]  # fmt: skip
+    return Content("\n").join(lines)
+
+
+def verdict(report: dict[str, Any]) -> str:
+    """Say in a word whether the model explains the readings."""
+    chi2 = report["chi2_per_dof"]
+    if chi2 is None:
+        return "too few"
+    if chi2 > 1.25:
+        return "! too much"
+    return "✓ good" if chi2 > 0.75 else "! too little"
+
+
+def words(answer: FitAnswer | None) -> Content:
+    """What is not determined, which readings are excluded, what else to know."""
+    if answer is None:
+        return Content("")
+    report = answer.report
+    chi2 = report["chi2_per_dof"]
+    parts: list[Content] = []
+    if chi2 is not None and chi2 > 1.25:
+        parts.append(
+            Content.from_markup(
+                "[$warning]![/] More is left than noise: an effect is missing, or the readings' "
+                "uncertainties are too small."
+            )
+        )
+    parts += [
+        Content.from_markup("[$warning]✗[/] line $line: $why", line=bad["line"], why=bad["why"])
+        for bad in report["bad_readings"]
+    ]
+    if report["left_out_readings"]:
+        parts.append(
+            Content(f"{report['left_out_readings']} readings lack a channel that an effect needs.")
+        )
+    groups = list(zip(report["unidentified"], report["unidentified_words"], strict=True))
+    parts += [Content(f"{sentence}.") for group, sentence in groups if len(group) > 1]
+    alone = [group[0] for group, _ in groups if len(group) == 1]
+    if alone:
+        which = f"{len(alone)} parameters are" if len(alone) > 1 else "One parameter is"
+        parts.append(
+            Content.assemble(
+                f"{which} not seen by these readings and kept near the drawing: ",
+                (", ".join(alone), "dim"),
+            )
+        )
+    if not parts:
+        parts = [Content.from_markup("[$success]✓[/] Nothing is left open.")]
+    return Content("\n").join(parts)
+
+
+def parameter_row(entry: dict[str, Any], wide: bool) -> list[Text]:
+    """Cells of one parameter."""
+    digits = 4 if entry["unit"] == "mm" else 6
+    nominal, sigma = entry["nominal"], entry["sigma"]
+    change = None if nominal is None else entry["value"] - nominal
+    ratio = "" if change is None or not sigma else f"{change / sigma:+.1f}"
+    cells = [entry["name"], f"{entry['value']:.{digits}f}"] if wide else [entry["name"]]
+    cells += ["" if change is None else f"{change:+.{digits}f}", f"{sigma:.{digits}f}", ratio]
+    style = "" if entry["identified"] else "dim"
+    row = [Text(cells[0], style)]
+    row += [Text(cell, style, justify="right") for cell in cells[1:]]
+    return [*row, Text("" if entry["identified"] else "open", "#e8b45a")]
+
+
+def _number(value: float | None, width: int, digits: int = 1) -> str:
+    return f"{value:{width}.{digits}f}" if value is not None else f"{'-':>{width}}"
+
+
+def _short(runs: tuple[str, ...]) -> str:
+    """Name runs: the session's folder where the run lies in one."""
+    names = [Path(run).parent.name if Path(run).name == "run" else Path(run).name for run in runs]
+    return ", ".join(names)

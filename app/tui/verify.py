@@ -1,0 +1,182 @@
+"""Verify: how far the machine is from where it is sent, before and after, pose by pose."""
+
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal, Vertical
+from textual.content import Content
+from textual.widgets import DataTable, Static
+
+from app.tui.dialogs import Choose, Pick
+from app.tui.face import Face
+from app.tui.picture import Picture
+from app.tui.verifying import Verified, finished_verifications
+from app.tui.widgets.plots import PairPlot
+from app.verification import PAPER, Summary
+
+ALL, QUICK = "all 216 poses", "quick: 27 poses"
+
+
+class VerifyFace(Face):
+    """The proof."""
+
+    mode = "verify"
+    label = "Verify"
+    about = (
+        "v sends the machine over a grid of poses that no fit has seen and measures where it "
+        "goes; nothing is fitted and nothing is written. The last verification stands as 'after', "
+        "the one before it as 'before'; o chooses another 'before'. A perfect machine would show "
+        "what the tracker's noise alone shows. On a mock the noise-free truth stands beside it."
+    )
+    AUTO_FOCUS: ClassVar[str | None] = "#verify-table"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("v", "verify", "Verify", tooltip="Measure the verification poses"),
+        Binding("o", "before", "Choose before", tooltip="Choose an earlier verification"),
+        Binding("w", "worst", "Worst first", tooltip="Sort by the error, or by the path"),
+    ]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._drawn: tuple[object, ...] = ()
+        self._worst_first = False
+
+    def body(self) -> ComposeResult:
+        """Summary on top, poses below, the picture beside them where there is room."""
+        yield Static(id="verify-summary", classes="panel")
+        with Horizontal(id="verify"):
+            yield DataTable(id="verify-table", cursor_type="row", zebra_stripes=True)
+            with Vertical(id="verify-plots"):
+                yield PairPlot("Position error, µm, pose by pose", id="verify-position")
+                yield PairPlot("Orientation error, mdeg, pose by pose", id="verify-angle")
+
+    def on_mount(self) -> None:
+        """Name the panels."""
+        self.query_one("#verify-summary").border_title = "Verification"
+        self.query_one("#verify-table").border_title = "Poses"
+
+    def show(self, picture: Picture) -> None:
+        """Draw summary, table and plots; the latter only when there is news."""
+        before, after = self.desk.before, self.desk.after
+        self.query_one("#verify-summary", Static).update(summary_text(before, after))
+        drawn = (before, after, self._worst_first, self.wide)
+        if drawn == self._drawn:
+            return
+        self._drawn = drawn
+        self._fill(before, after)
+        for which, name in ((0, "position"), (1, "angle")):
+            series = {}
+            for label, verified in (("before", before), ("after", after)):
+                if verified is not None:
+                    errors = verified.errors[which]
+                    series[label] = (np.arange(1.0, len(errors) + 1.0), errors)
+            self.query_one(f"#verify-{name}", PairPlot).show(series, (id(before), id(after)))
+
+    def _fill(self, before: Verified | None, after: Verified | None) -> None:
+        table = self.query_one("#verify-table", DataTable)
+        table.clear(columns=True)
+        shown = [v for v in (before, after) if v is not None]
+        names = ["before µm", "after µm", "before mdeg", "after mdeg"]
+        if len(shown) < 2:
+            names = ["µm", "mdeg"]
+        table.add_columns("pose", *(Text(name, justify="right") for name in names))
+        if not shown:
+            return
+        labels = list(shown[-1].found.labels)
+        by_label = [dict(zip(v.found.labels, v.errors.T, strict=True)) for v in shown]
+        if self._worst_first:
+            labels.sort(key=lambda label: -float(by_label[-1][label][0]))
+        rows = []
+        for label in labels:
+            cells = [
+                f"{one[label][which]:.1f}" if label in one else "-"
+                for which in (0, 1)
+                for one in by_label
+            ]
+            rows.append([label, *(Text(cell, justify="right") for cell in cells)])
+        table.add_rows(rows)
+        table.border_subtitle = (
+            f"{len(labels)} poses, {'worst first' if self._worst_first else 'in order of path'}"
+        )
+
+    # keys
+
+    def action_verify(self) -> None:
+        """Choose how many poses, and go."""
+        site = self.desk.site
+        if site is None or not self.desk.connected or self.desk.busy:
+            self.act(self._refuse)
+            return
+
+        def chosen(answer: str | None) -> None:
+            if answer:
+                quick = answer == QUICK
+                self.act(lambda: self.desk.verify(quick), busy="choosing verification poses ...")
+
+        text = (
+            f"The machine will visit a grid of poses with {site.hands.smrs} "
+            f"SMR{'s' if site.hands.smrs > 1 else ''}. Progress is on the Measure screen."
+        )
+        self.app.push_screen(Choose("Verify", text, (ALL, QUICK)), chosen)
+
+    async def _refuse(self) -> None:
+        self.desk.idle_station("verify")
+
+    def action_before(self) -> None:
+        """Choose what stands as 'before'."""
+        found = finished_verifications(self.desk.root)
+        if not found:
+            self.notify(f"No finished verification in {self.desk.root}.")
+            return
+
+        def picked(answer: str | None) -> None:
+            if answer:
+                self.act(lambda: self.desk.load_before(Path(answer)))
+
+        options = [(str(folder), folder.name) for folder in found]
+        self.app.push_screen(Pick("Before", "Finished verifications, newest first", options),
+                             picked)  # fmt: skip
+
+    def action_worst(self) -> None:
+        """Sort the other way."""
+        self._worst_first = not self._worst_first
+        self.draw()
+
+
+def summary_text(before: Verified | None, after: Verified | None) -> Content:
+    """Peaks and standard deviations, before and after, with what they can be compared to."""
+    if before is None and after is None:
+        return Content.from_markup("[bold $accent]v[/] measures where the machine goes.")
+    lines = [
+        Content.from_markup("[dim]                      peak µm   std µm     peak °     std °[/]")
+    ]
+    for when, verified in (("before", before), ("after", after)):
+        if verified is None:
+            continue
+        name = f"{when}, " if before is not None and after is not None else ""
+        lines.append(_line(f"{name}measured", verified.found.measured, bold=when == "after"))
+        if verified.found.truth is not None:
+            lines.append(_line(f"{name}true (mock)", verified.found.truth))
+    last = after or before
+    assert last is not None
+    found = last.found
+    lines.append(Content(f"tracker noise alone {found.noise_peak_um:9.1f}{'':>9}"
+                         f"{found.noise_peak_deg:11.4f}"))  # fmt: skip
+    lines.append(
+        Content.from_markup(
+            "[dim]Han et al. 2020     $um         $deg   (after, measured)[/]",
+            um=f"{PAPER['position_peak_um']:9.1f}", deg=f"{PAPER['orientation_peak_deg']:9.4f}",
+        )
+    )  # fmt: skip
+    return Content("\n").join(lines)
+
+
+def _line(name: str, found: Summary, *, bold: bool = False) -> Content:
+    text = (
+        f"{name:<20}{found.position_peak_um:9.1f}{found.position_std_um:9.1f}"
+        f"{found.orientation_peak_deg:11.4f}{found.orientation_std_deg:10.4f}"
+    )
+    return Content.assemble((text, "bold" if bold else ""))

@@ -1,0 +1,69 @@
+"""Verification sessions: the plan, and what became of them, judged again from their journals."""
+
+import asyncio
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from app.machine_files import read_text
+from app.session import Plan, PlanOptions, measure_plan
+from app.session.journal import Journal
+from app.session.plans import order_for
+from app.site import Site, load_site
+from app.verification import Verification, judge
+from calib.arrays import Array
+from calib.poses import verification_poses
+
+QUICK_EVERY = 8
+"""One orientation of eight at each node of the grid; another one at each."""
+
+
+@dataclass(frozen=True, eq=False)
+class Verified:
+    """A finished verification; ``errors`` (2, N): position in um, orientation in mdeg."""
+
+    folder: Path
+    found: Verification
+    errors: Array
+
+
+async def verification_plan(site: Site, quick: bool) -> Plan:
+    """The grid of 27 nodes x 8 orientations, or one orientation at each node."""
+    # A moment of arithmetic: beside the event loop, so that the stop key stays alive.
+    poses = (await asyncio.to_thread(verification_poses, site.machine)).by_label
+    if quick:
+        labels = list(poses)
+        chosen = [
+            labels[node * QUICK_EVERY + node % QUICK_EVERY]
+            for node in range(len(labels) // QUICK_EVERY)
+        ]
+        poses = {label: poses[label] for label in chosen}
+    options = PlanOptions(
+        order=order_for(site),
+        reference_every=40,
+        warm_up=False,
+        two_face=False,
+        truth=site.hands.kind == "mock",
+        title=f"verification, {len(poses)} poses",
+    )
+    return measure_plan(site, poses, options, "verify")
+
+
+def verified(folder: Path) -> Verified:
+    """Judge a finished session from its folder; raises :class:`calib.errors.BadInput`."""
+    plan = Plan.from_json(read_text(folder / "plan.json"), str(folder / "plan.json"))
+    site = load_site(folder / "site.toml")
+    journal = Journal(folder / "journal.sqlite", read_only=True)
+    try:
+        found = judge(site, plan, journal)
+    finally:
+        journal.close()
+    position = 1e3 * np.linalg.norm(found.position_mm, axis=0)
+    angle = 1e3 * np.rad2deg(np.linalg.norm(found.rotation_rad, axis=0))
+    return Verified(folder, found, np.array([position, angle]))
+
+
+def finished_verifications(root: Path) -> list[Path]:
+    """Folders of finished verification sessions, newest first."""
+    return sorted((p.parent.parent for p in root.glob("*-verify*/run/run.toml")), reverse=True)

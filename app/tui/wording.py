@@ -1,0 +1,26 @@
+"""Words for errors and channels."""
+
+from collections.abc import Mapping
+from typing import Any
+
+
+def said(error: Exception) -> tuple[str, str]:
+    """Split an error of ours into what happened and what to do."""
+    what = str(getattr(error, "what", "") or error)
+    device = str(getattr(error, "device", ""))
+    place = str(getattr(error, "place", ""))
+    where = device or place
+    remedy = str(getattr(error, "remedy", ""))
+    return (f"{where}: {what}" if where else what), remedy
+
+
+def channel_text(channels: Mapping[str, Any]) -> str:
+    """Render a machine's channels: ``structure_temp_C`` becomes ``structure temp 20.13 C``."""
+    units = {"C": "C", "kg": "kg", "hPa": "hPa", "s": "s", "mm": "mm"}
+    parts = []
+    for name, value in channels.items():
+        *words, last = name.split("_")
+        unit = units.get(last, "")
+        label = " ".join(words if unit else [*words, last])
+        parts.append(f"{label} {value:.2f} {unit}".rstrip())
+    return "   ".join(parts)
