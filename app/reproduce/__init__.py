@@ -1,0 +1,1 @@
+"""Every number of the three papers beside ours: ``pkmcal reproduce``."""
