@@ -1,0 +1,5 @@
+"""``python -m app`` is ``pkmcal``."""
+
+from app.cli import main
+
+main()

@@ -1,0 +1,1 @@
+"""The whole job on the mock hexapod, without a person."""

@@ -1,0 +1,83 @@
+"""Show the whole job on a mock hexapod: measure, identify, correct, verify
+
+The mock is a process of its own, reached over slcan and the tracker's TCP protocol.
+"""
+
+import asyncio
+import time
+from datetime import datetime
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from app import answer
+from app.console import stopping
+from app.demo.job import Demo, Outcome
+from app.demo.screen import DemoScreen, result_lines
+from app.demo.station import mock_station
+from app.errors import StoppedByOperator
+
+HEAD = ("216 poses", "peak um", "std um", "peak deg", "std deg")
+
+
+@click.command()
+@click.option("--seed", default=1, show_default=True, help="Which machine, room and noise.")
+@click.option(
+    "--poses",
+    "count",
+    default=29,
+    show_default=True,
+    type=click.IntRange(10, 200),
+    help="Poses to measure.",
+)
+@click.option(
+    "--scale",
+    default=600.0,
+    show_default=True,
+    type=click.FloatRange(1.0, 2000.0),
+    help="Machine seconds in one second.",
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    help="Folder to make.  [default: out/demo-<date and time>]",
+)
+@answer.json_option
+def command(seed: int, count: int, scale: float, out: Path | None, as_json: bool) -> None:
+    """Calibrate a mock hexapod without a person, and write a report.
+
+    Verifies 216 poses, measures the chosen ones with a laser tracker over TCP, identifies 54
+    parameters, writes them to the motion controller over CAN, and verifies again.
+    """
+    folder = out or Path("out") / f"demo-{datetime.now():%Y%m%d-%H%M%S}"
+    folder.mkdir(parents=True, exist_ok=True)
+    folder = folder.resolve()
+    screen = DemoScreen(Console(stderr=True, highlight=False, quiet=as_json))
+    began = time.monotonic()
+    with screen.shown(), mock_station("hexapod", seed, scale, folder) as site_file:
+        outcome = asyncio.run(_run(Demo(folder, count, seed, screen.watcher), site_file))
+    rows = result_lines(outcome)
+    answer.show(
+        _json(outcome, time.monotonic() - began),
+        as_json,
+        f"{answer.table(HEAD, rows)}\n\nreport: {outcome.report}",
+    )
+
+
+async def _run(demo: Demo, site_file: Path) -> Outcome:
+    try:
+        with stopping(demo.stop):
+            return await demo.run(site_file)
+    except asyncio.CancelledError:
+        raise StoppedByOperator() from None
+
+
+def _json(outcome: Outcome, seconds: float) -> dict[str, object]:
+    return {
+        "format": "pkm-demo/1",
+        "before": {k: v for k, v in outcome.before.to_json().items() if k != "errors"},
+        "after": {k: v for k, v in outcome.after.to_json().items() if k != "errors"},
+        "report": str(outcome.report),
+        "seconds": seconds,
+    }
