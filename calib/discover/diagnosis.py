@@ -12,7 +12,7 @@ import numpy as np
 
 from calib.arrays import Array
 from calib.discover.candidate import Candidate
-from calib.discover.evidence import log_evidence, observed
+from calib.discover.evidence import observed
 from calib.discover.family import Family, family
 from calib.discover.pairs import rivals
 from calib.discover.problem import LinearProblem
@@ -21,7 +21,7 @@ from calib.discover.scores import Scores, chi_squares, score
 
 ALPHA = 0.05
 DRAWS = 399
-STRUCTURE_SHARE = 0.25
+STRUCTURE_SHARE = 0.05
 """Part of the false alarms that structure of unknown origin may cause; effects have the rest."""
 IN_QUESTION = 7.0
 """Candidates whose evidence is less than e^7 below the best are still in question."""
@@ -229,13 +229,8 @@ def _judge(scores: Scores, effects: int, quadratic: Sequence[Quadratic]) -> _Rou
     return _Round(scores, family(levels, weights), tuple(range(effects)))
 
 
-def _observed_evidence(scores: Scores, index: int) -> tuple[float, list[Array]]:
-    total, parts = log_evidence(scores, index, observed(scores, index))
-    return float(total[0]), parts
-
-
 def _ranked(judged: _Round) -> tuple[list[int], dict[int, float]]:
-    evidences = {i: _observed_evidence(judged.scores, i)[0] for i in judged.effects}
+    evidences = {i: observed(judged.scores, i)[0] for i in judged.effects}
     return sorted(judged.effects, key=lambda index: -evidences[index]), evidences
 
 
@@ -279,7 +274,7 @@ def _in_question(
 
 def _best_hypothesis(scores: Scores, index: int) -> tuple[int, int]:
     """Number of the hypothesis and of the trial with the most evidence."""
-    _, parts = _observed_evidence(scores, index)
+    _, parts = observed(scores, index)
     number = int(np.argmax([part[:, 0].max() for part in parts]))
     return number, int(np.argmax(parts[number][:, 0]))
 
@@ -363,7 +358,7 @@ def _unexplained(judged: _Round, quadratic: Sequence[Quadratic], alpha: float) -
 
 def _dependence(scores: Scores, index: int, log_p: float) -> Dependence:
     candidate = scores.candidates[index]
-    evidence, _ = _observed_evidence(scores, index)
+    evidence, _ = observed(scores, index)
     _, trial = _best_hypothesis(scores, index)
     period = candidate.trials[trial][0] if candidate.trials[trial] else None
     return Dependence(candidate.channel, log_p, evidence, period)

@@ -23,9 +23,13 @@ TAUS = np.geomspace(1.0 / 30.0, 3.0, 7)
 """Multiples of the stated size over which the prior of an effect is averaged."""
 
 
-def observed(scores: Scores, index: int) -> Array:
-    """Scores (T, k, 1) of the observation in units of the noise as it really is."""
-    return scores.scores[index][:, :, :1] / scores.noise
+def observed(scores: Scores, index: int) -> tuple[float, list[Array]]:
+    """Log Bayes factor of a candidate in the observation, and its parts (T, 1)."""
+    if index not in scores.remembered:
+        found = scores.scores[index][:, :, :1] / scores.noise
+        total, parts = log_evidence(scores, index, found)
+        scores.remembered[index] = (float(total[0]), parts)
+    return scores.remembered[index]
 
 
 def log_evidence(scores: Scores, index: int, residual_scores: Array) -> tuple[Array, list[Array]]:
@@ -37,8 +41,7 @@ def log_evidence(scores: Scores, index: int, residual_scores: Array) -> tuple[Ar
     index : int
         Which candidate.
     residual_scores : (T, k, D)
-        Its unit columns times D residuals, in sigmas as they really are: ``observed(scores,
-        index)``, or shifted null draws.
+        Its unit columns times D residuals, in sigmas as they really are.
 
     Returns
     -------
@@ -67,11 +70,8 @@ def _by_trial(scores: Scores, index: int, subset: tuple[int, ...], residual_scor
     values, vectors = np.linalg.eigh(weight * size[:, :, None] * size[:, None, :])
     values = np.maximum(values, 0.0)
     rotated = np.swapaxes(vectors, 1, 2) @ (size[:, :, None] * residual_scores[:, chosen])
-    terms = []
-    for tau in TAUS:
-        gain = tau**2 / (1.0 + tau**2 * values)
-        terms.append(
-            0.5 * np.einsum("tk,tkd->td", gain, rotated**2)
-            - 0.5 * np.sum(np.log1p(tau**2 * values), axis=1)[:, None]
-        )
-    return np.asarray(special.logsumexp(terms, axis=0) - np.log(TAUS.size))
+    grown = 1.0 + TAUS[:, None] ** 2 * values[:, None, :]
+    gain = 0.5 * (TAUS[:, None] ** 2 / grown) @ rotated**2
+    terms = gain - 0.5 * np.sum(np.log(grown), axis=2)[:, :, None]
+    top = terms.max(axis=1)
+    return np.asarray(top + np.log(np.mean(np.exp(terms - top[:, None]), axis=1)))

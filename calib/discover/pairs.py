@@ -68,14 +68,14 @@ def rivals(
     the readings themselves have left it so, whatever was to be expected.
     """
     undecided = float(np.log(TOLD_APART / (1.0 - TOLD_APART)))
-    mine, _ = log_evidence(scores, best, observed(scores, best))
+    mine, _ = observed(scores, best)
     found = []
     for rival in questioned:
         if rival == best:
             continue
-        theirs, _ = log_evidence(scores, rival, observed(scores, rival))
+        theirs, _ = observed(scores, rival)
         if (
-            abs(float(mine[0] - theirs[0])) < undecided
+            abs(mine - theirs) < undecided
             or prefers(scores, best, rival, signatures[best]) < TOLD_APART
             or prefers(scores, rival, best, signatures[rival]) < TOLD_APART
         ):

@@ -12,7 +12,7 @@ alarm exact.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -63,6 +63,8 @@ class Scores:
     norms: list[Array]
     scores: list[Array]
     weights: list[Array]
+    remembered: dict[int, tuple[float, list[Array]]] = field(default_factory=dict, repr=False)
+    """Evidence of the observation by candidate, kept by :mod:`calib.discover.evidence`."""
 
     @cached_property
     def squares(self) -> Array:

@@ -1,7 +1,9 @@
 """Tail probabilities of chi-square, fast for many values and exact where sf underflows."""
 
+from functools import lru_cache
+
 import numpy as np
-from scipy import special, stats
+from scipy import special
 
 from calib.arrays import Array
 
@@ -13,14 +15,20 @@ def log_tail(chi2: Array, dof: int) -> Array:
     """log P(chi-square with ``dof`` degrees of freedom > chi2), to 1e-4; 0 for no freedom."""
     if dof == 0:
         return np.zeros_like(chi2)
-    end = TABLE_END + 2.0 * dof
-    roots = np.linspace(0.0, np.sqrt(end), 600)
-    table = stats.chi2.logsf(roots**2, dof)
+    roots, table, end = _table(dof)
     answer = np.interp(np.sqrt(np.maximum(chi2, 0.0)), roots, table)
     far = chi2 > end
     if far.any():
         answer[far] = _far_tail(chi2[far], dof)
     return answer
+
+
+@lru_cache(maxsize=256)
+def _table(dof: int) -> tuple[Array, Array, float]:
+    """Square roots of chi-square, log tail at them, and the end of the table."""
+    end = TABLE_END + 2.0 * dof
+    roots = np.linspace(0.0, np.sqrt(end), 600)
+    return roots, np.log(special.chdtrc(dof, roots**2)), end
 
 
 def _far_tail(chi2: Array, dof: int) -> Array:
