@@ -8,6 +8,12 @@ Names, with what reads them:
 ``parameter-corrupt:NAME``              the controller answers another value for parameter NAME
 ``parameter-missing:NAME``              the controller does not know parameter NAME
 ``parameter-nan:NAME``                  the controller answers NaN for parameter NAME
+``write-refused:NAME``                  the controller refuses to write parameter NAME
+``write-lost:NAME``                     the controller acknowledges NAME and does not keep it
+``reference-lost:N``                    one-shot: drive N forgets that it was homed
+``write-refused:NAME``                  the controller refuses to take parameter NAME
+``write-lost:NAME``                     the controller acknowledges NAME and keeps the old value
+``reference-lost:N``                    one-shot: drive N forgets where its reference is
 ``store-refused``                       the controller refuses to store its parameters
 ``power-cycle``                         one-shot: the controller and the drives lose their volatile
                                         memory and boot again

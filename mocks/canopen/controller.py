@@ -15,7 +15,7 @@ from canopen.sdo.exceptions import SdoAbortedError
 
 from mocks.canopen.compensation import Compensation, direction_of
 from mocks.canopen.drive402 import COUNTS_PER_MM, PEAK_SPEED, Drive
-from mocks.canopen.hexapod_kinematics import PARAMETERS, Unreachable, leg_lengths
+from mocks.canopen.hexapod_kinematics import HexapodKinematics, Unreachable
 from mocks.canopen.node import (
     ABORT_CANNOT_STORE,
     ABORT_DEVICE_STATE,
@@ -80,6 +80,7 @@ class Controller(StationNode):
         self.parameters = ParameterSet(self.object_dictionary, nvm_path)
         self._server = ParameterServer(self, self.parameters, machine.faults)
         count = len(drives)
+        self._kinematics = HexapodKinematics()
         self._axes = range(1, count + 1)
         self._direction = [0] * count
         self._wanted = [0.0] * count
@@ -137,10 +138,10 @@ class Controller(StationNode):
 
     def _reference(self, n: int) -> float:
         """q of actuator ``n`` at extension 0."""
-        return self.parameters.active[f"leg{n + 1}.L0"]
+        return self._kinematics.reference(n, self.parameters.active)
 
     def _compensation(self, n: int) -> Compensation:
-        active, leg = self.parameters.active, f"leg{n + 1}"
+        active, leg = self.parameters.active, self._kinematics.limbs[n]
         table = f"screw-cyclic-table.{leg}"
         points = sum(name.startswith(f"{table}.") for name in active) - 1
         return Compensation(
@@ -198,9 +199,8 @@ class Controller(StationNode):
         return Result.UNKNOWN_COMMAND
 
     def _solve(self) -> list[float]:
-        active = self.parameters.active
-        own = [[active[f"leg{axis}.{name}"] for name in PARAMETERS] for axis in self._axes]
-        return list(leg_lengths([self.value(0x2400, axis) for axis in self._axes], own))
+        pose = [self.value(0x2400, axis) for axis in self._axes]
+        return self._kinematics.targets(pose, self.parameters.active)
 
     def _outside(self, targets: Sequence[float]) -> int:
         """Bits of the actuators whose target is outside the controller's limits."""

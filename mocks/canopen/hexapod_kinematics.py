@@ -103,3 +103,18 @@ def leg_lengths(pose: Sequence[float], parameters: Sequence[Sequence[float]]) ->
     x, y, z, alpha, beta, gamma = pose
     rows = rotation(alpha, beta, gamma)
     return tuple(leg_length((x, y, z), rows, leg, own) for leg, own in enumerate(parameters))
+
+
+class HexapodKinematics:
+    """The hexapod's part of a controller: what its limbs are called and how a pose becomes q."""
+
+    limbs = tuple(f"leg{n}" for n in range(1, 7))
+
+    def reference(self, n: int, active: Mapping[str, float]) -> float:
+        """q of actuator ``n`` (from 0) at extension 0: the L0 that the controller holds."""
+        return active[f"{self.limbs[n]}.L0"]
+
+    def targets(self, pose: Sequence[float], active: Mapping[str, float]) -> list[float]:
+        """q of all actuators at ``pose`` with the parameters ``active``; raises Unreachable."""
+        own = [[active[f"{limb}.{name}"] for name in PARAMETERS] for limb in self.limbs]
+        return list(leg_lengths(pose, own))

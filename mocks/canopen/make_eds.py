@@ -4,12 +4,10 @@ The layout of a motion controller follows from the machine file alone (its actua
 nominal values of its parameters), so that another machine is another file, not another program.
 """
 
-import sys
-import tomllib
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
+from collections.abc import Sequence
 
+from calib.mechanism.description import Machine
+from drivers.canopen.eds import EDS_FOLDER
 from mocks.canopen.eds_text import (
     Entry,
     Object,
@@ -20,12 +18,10 @@ from mocks.canopen.eds_text import (
     record,
     variable,
 )
+from mocks.physics.truth import machine_file
 
-ROOT = Path(__file__).resolve().parents[2]
-EDS_FOLDER = ROOT / "drivers" / "eds"
 TABLE_POINTS = 32
 DRIVE_PRODUCT, CONTROLLER_PRODUCT = 0x402, 0x1000
-POSE_NAMES = {6: ("x", "y", "z", "alpha", "beta", "gamma"), 2: ("tilt", "azimuth")}
 
 
 def drive_objects() -> list[Object]:
@@ -78,31 +74,29 @@ def drive_objects() -> list[Object]:
     ]
 
 
-def nominal_parameters(machine: Mapping[str, Any]) -> dict[str, dict[str, tuple[float, str]]]:
-    """Return limb -> parameter -> (nominal value, unit) from a parsed machine file."""
-    found = {}
-    for limb, limb_table in machine["limbs"].items():
-        declared = machine["limb_types"][limb_table["type"]]["parameters"]
-        found[limb] = {
-            name: (float(limb_table.get(name, table.get("nominal", 0.0))), table["unit"])
-            for name, table in declared.items()
-        }
-    return found
-
-
-def parameter_objects(machine: Mapping[str, Any]) -> list[Object]:
+def parameter_objects(machine: Machine) -> list[Object]:
     """Return the kinematic parameters: one array a limb from 0x2101 on."""
+    limbs: dict[str, list[Entry]] = {}
+    for parameter in machine.parameters:
+        limb = parameter.name.partition(".")[0]
+        entry = Entry(parameter.name, "REAL64", "rw", float(parameter.nominal), parameter.unit)
+        limbs.setdefault(limb, []).append(entry)
     return [
-        array(
-            0x2101 + n,
-            f"Kinematic parameters {limb}",
-            [
-                Entry(f"{limb}.{name}", "REAL64", "rw", value, unit)
-                for name, (value, unit) in values.items()
-            ],
-        )
-        for n, (limb, values) in enumerate(nominal_parameters(machine).items())
+        array(0x2101 + n, f"Kinematic parameters {limb}", entries)
+        for n, (limb, entries) in enumerate(limbs.items())
     ]
+
+
+def driven_limbs(machine: Machine) -> list[str]:
+    """Return the limb that each actuator drives, in the order of the actuators."""
+    drives = {
+        term.index: limb.name
+        for limb in machine.limbs
+        for element in limb.elements
+        for term in element.terms
+        if term.kind == "actuator"
+    }
+    return [drives[n] for n in range(len(machine.actuators))]
 
 
 def compensation_objects(legs: list[str], unit: str) -> list[Object]:
@@ -130,80 +124,80 @@ def compensation_objects(legs: list[str], unit: str) -> list[Object]:
     ]
 
 
-def motion_objects(actuators: Mapping[str, Any], pose_unit: tuple[str, ...]) -> list[Object]:
-    """Return the objects that command motion and report it; q in the actuator's own unit."""
-    count = len(actuators)
-    unit = next(iter(actuators.values()))["unit"]
-    low = [Entry(f"{q} min", "REAL64", "ro", float(a["limits"][0]), unit)
-           for q, a in actuators.items()]  # fmt: skip
-    high = [Entry(f"{q} max", "REAL64", "ro", float(a["limits"][1]), unit)
-            for q, a in actuators.items()]  # fmt: skip
-    home = [float(a["home"]) for a in actuators.values()]
-    pose = zip(POSE_NAMES[count], pose_unit, strict=True)
-    per_q = list(zip(actuators, home, strict=True))
+def per_actuator(
+    machine: Machine,
+    kind: str,
+    access: str,
+    values: Sequence[float],
+    name: str = "",
+    pdo: bool = False,
+) -> list[Entry]:
+    """Return one entry an actuator, in its unit; ``name`` follows the actuator's own."""
     return [
-        array(
-            0x2400,
-            "Commanded pose",
-            [Entry(n, "REAL64", "rw", 0.0, u, True) for n, u in pose],
-        ),
-        record(
-            0x2401,
-            "Motion command",
-            [
-                Entry("Sequence number", "U16", "rw", 0, "", True),
-                Entry("Command", "U8", "rw", 0, "", True),
-            ],
-        ),
-        array(0x2402, "Commanded q", [Entry(q, "REAL64", "rw", h, unit) for q, h in per_q]),
-        array(
-            0x2403,
-            "Drive set-points for commanded q",
-            [Entry(q, "I32", "ro", 0, f"n{unit[-1] if unit == 'mm' else unit}") for q in actuators],
-        ),
-        record(
-            0x2410,
-            "Motion status",
-            [
-                Entry("Sequence number", "U16", "ro", 0, "", True),
-                Entry("Status bits", "U16", "ro", 0, "", True),
-                Entry("Result of the last command", "U16", "ro", 0, "", True),
-                Entry("Actuators concerned", "U16", "ro", 0, "", True),
-            ],
-        ),
-        array(
-            0x2411, "Targets q", [Entry(q, "REAL64", "ro", h, unit, True) for q, h in per_q]
-        ),
-        array(0x2412, "Actual q", [Entry(q, "REAL64", "ro", h, unit) for q, h in per_q]),
-        array(0x2420, "Lower limits of q", low),
-        array(0x2421, "Upper limits of q", high),
-        variable(0x2430, Entry("Largest actuator speed", "REAL64", "rw", 20.0, f"{unit}/s")),
-    ]  # fmt: skip
+        Entry(f"{a.name}{name}", kind, access, value, a.unit, pdo)
+        for a, value in zip(machine.actuators, values, strict=True)
+    ]
 
 
-def controller_objects(machine: Mapping[str, Any]) -> list[Object]:
-    """Return the dictionary of the motion controller of a parsed machine file."""
-    actuators = machine["actuators"]
-    count = len(actuators)
-    unit = next(iter(actuators.values()))["unit"]
-    legs = [limb for limb, table in machine["limbs"].items() if "q" in table]
-    name = str(machine["name"])
-    pose_unit = ("mm",) * 3 + ("rad",) * 3 if count == 6 else ("rad",) * count
-    kinematic = parameter_objects(machine)
-    p_count = sum(len(obj.entries) for obj in kinematic)
-    objects = [
-        *communication_objects(f"pkmcal mock {name} controller", CONTROLLER_PRODUCT, 0, 1001),
+def motion_objects(machine: Machine) -> list[Object]:
+    """Return the objects that command motion and report it; q in the actuator's own unit."""
+    home = [float(a.home) for a in machine.actuators]
+    low = [float(a.limits[0]) for a in machine.actuators]
+    high = [float(a.limits[1]) for a in machine.actuators]
+    pose = [
+        Entry(name, "REAL64", "rw", 0.0, "mm" if name in "xyz" else "rad", True)
+        for name in machine.task.coordinates
+    ]
+    counts = [Entry(a.name, "I32", "ro", 0, "counts of the drive") for a in machine.actuators]
+    command = [
+        Entry("Sequence number", "U16", "rw", 0, "", True),
+        Entry("Command", "U8", "rw", 0, "", True),
+    ]
+    status = [
+        Entry("Sequence number", "U16", "ro", 0, "", True),
+        Entry("Status bits", "U16", "ro", 0, "", True),
+        Entry("Result of the last command", "U16", "ro", 0, "", True),
+        Entry("Actuators concerned", "U16", "ro", 0, "", True),
+    ]
+    speed = Entry("Largest actuator speed", "REAL64", "rw", 20.0, f"{machine.actuators[0].unit}/s")
+    return [
+        array(0x2400, "Commanded pose", pose),
+        record(0x2401, "Motion command", command),
+        array(0x2402, "Commanded q", per_actuator(machine, "REAL64", "rw", home)),
+        array(0x2403, "Drive set-points for commanded q", counts),
+        record(0x2410, "Motion status", status),
+        array(0x2411, "Targets q", per_actuator(machine, "REAL64", "ro", home, pdo=True)),
+        array(0x2412, "Actual q", per_actuator(machine, "REAL64", "ro", home)),
+        array(0x2420, "Lower limits of q", per_actuator(machine, "REAL64", "ro", low, " min")),
+        array(0x2421, "Upper limits of q", per_actuator(machine, "REAL64", "ro", high, " max")),
+        variable(0x2430, speed),
+    ]
+
+
+def controller_pdos(machine: Machine) -> list[Object]:
+    """Return the PDOs: command and status first, then one REAL64 each."""
+    command = [(0x2401, 1, "U16"), (0x2401, 2, "U8")]
+    status = [(0x2410, sub, "U16") for sub in (1, 2, 3, 4)]
+    objects = [*pdo_objects(1, True, command), *pdo_objects(1, False, status)]
+    for n in range(1, len(machine.task.coordinates) + 1):
+        objects += pdo_objects(n + 1, True, [(0x2400, n, "REAL64")])
+    for n in range(1, len(machine.actuators) + 1):
+        objects += pdo_objects(n + 1, False, [(0x2411, n, "REAL64")])
+    return objects
+
+
+def machine_objects(machine: Machine) -> list[Object]:
+    """Return what the controller says of its machine: name, counts, channels."""
+    return [
         record(
             0x2000,
             "Machine",
             [
-                Entry("Name", "STRING", "const", name),
-                Entry("Number of actuators", "U8", "const", count),
-                Entry("Number of kinematic parameters", "U16", "const", p_count),
+                Entry("Name", "STRING", "const", machine.name),
+                Entry("Number of actuators", "U8", "const", len(machine.actuators)),
+                Entry("Number of kinematic parameters", "U16", "const", len(machine.parameters)),
             ],
         ),
-        *kinematic,
-        *compensation_objects(legs, unit),
         array(
             0x2300,
             "Channels",
@@ -212,7 +206,12 @@ def controller_objects(machine: Mapping[str, Any]) -> list[Object]:
                 Entry("payload_kg", "REAL64", "ro", 0.0, "kg"),
             ],
         ),
-        *motion_objects(actuators, pose_unit),
+    ]
+
+
+def checking_objects() -> list[Object]:
+    """Return checksum, reload and the blocks."""
+    return [
         record(
             0x2500,
             "Parameter checksum",
@@ -225,28 +224,40 @@ def controller_objects(machine: Mapping[str, Any]) -> list[Object]:
         variable(0x2502, Entry("Block of active kinematic parameters", "DOMAIN", "ro")),
         variable(0x2503, Entry("Block of active compensation values", "DOMAIN", "ro")),
     ]
-    command = [(0x2401, 1, "U16"), (0x2401, 2, "U8")]
-    status = [(0x2410, sub, "U16") for sub in (1, 2, 3, 4)]
-    objects += [*pdo_objects(1, True, command), *pdo_objects(1, False, status)]
-    for n in range(1, count + 1):
-        objects += pdo_objects(n + 1, True, [(0x2400, n, "REAL64")])
-        objects += pdo_objects(n + 1, False, [(0x2411, n, "REAL64")])
-    return objects
 
 
-def main(machine_files: list[str]) -> None:
-    """Write the drive's EDS file and one for the controller of each machine file."""
-    drive = EDS_FOLDER / "drive402.eds"
-    drive.write_text(
-        eds_text(drive.name, "pkmcal mock drive", DRIVE_PRODUCT, drive_objects()), encoding="utf-8"
-    )
-    for machine_file in machine_files:
-        machine = tomllib.loads(Path(machine_file).read_text(encoding="utf-8"))
-        path = EDS_FOLDER / f"{machine['name']}_controller.eds"
-        product = f"pkmcal mock {machine['name']} controller"
-        text = eds_text(path.name, product, CONTROLLER_PRODUCT, controller_objects(machine))
-        path.write_text(text, encoding="utf-8")
+def controller_objects(machine: Machine) -> list[Object]:
+    """Return the dictionary of the motion controller of a machine."""
+    product = f"pkmcal mock {machine.name} controller"
+    return [
+        *communication_objects(product, CONTROLLER_PRODUCT, 0, 1001),
+        *machine_objects(machine),
+        *parameter_objects(machine),
+        *compensation_objects(driven_limbs(machine), machine.actuators[0].unit),
+        *motion_objects(machine),
+        *checking_objects(),
+        *controller_pdos(machine),
+    ]
+
+
+def controller_eds(machine: Machine) -> tuple[str, str]:
+    """Return file name and text of the EDS file of a machine's controller."""
+    name = f"{machine.name}_controller.eds"
+    product = f"pkmcal mock {machine.name} controller"
+    return name, eds_text(name, product, CONTROLLER_PRODUCT, controller_objects(machine))
+
+
+def drive_eds() -> tuple[str, str]:
+    """Return file name and text of the drive's EDS file."""
+    name = "drive402.eds"
+    return name, eds_text(name, "pkmcal mock drive", DRIVE_PRODUCT, drive_objects())
+
+
+def main() -> None:
+    """Write the EDS files that ship with the program."""
+    for name, text in (drive_eds(), controller_eds(machine_file("hexapod"))):
+        (EDS_FOLDER / name).write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or [str(ROOT / "calib" / "machines" / "hexapod.toml")])
+    main()

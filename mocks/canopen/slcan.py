@@ -68,6 +68,8 @@ class SlcanClient:
         self.is_open = False
         self.listens_only = False
         self._lock = threading.Lock()
+        self._closing = threading.Lock()
+        self._ended = False
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         connection.settimeout(SEND_DEADLINE_S)
 
@@ -83,6 +85,10 @@ class SlcanClient:
     def close(self, reset: bool = False) -> None:
         """End the connection; ``reset`` sends a TCP RST instead of a FIN."""
         self.is_open = False
+        with self._closing:
+            ended, self._ended = self._ended, True
+        if ended:
+            return
         with contextlib.suppress(OSError):
             if reset:
                 linger = struct.pack("hh" if os.name == "nt" else "ii", 1, 0)
@@ -212,6 +218,6 @@ class SlcanEndpoint:
             except (ValueError, IndexError):
                 client.send(BELL)
                 return
-            client.send(CR)
             self.broadcast(frame, but=client)
             self._receive(frame)
+            client.send(CR)

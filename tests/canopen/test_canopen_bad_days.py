@@ -90,7 +90,7 @@ async def test_lost_heartbeat_stops_the_machine(station, connected, enabled, nod
     await until(lambda: not station.moving)
     with pytest.raises(HeartbeatLost):
         enabled.check()
-    assert [a.device for a in connected.alarms if a.fault][0].endswith(f"(node {node})")
+    assert next(a.device for a in connected.alarms if a.fault).endswith(f"(node {node})")
     station.hands("clear")
     await enabled.clear_faults()
     await enabled.enable()

@@ -42,7 +42,11 @@ async def test_every_parameter_has_its_own_entry_with_the_value_of_the_block(
     controller: CanopenController,
 ):
     await controller.write_parameters(
-        {name: 0.001 * n for n, name in enumerate(controller.layout.compensation) if "table" in name}
+        {
+            name: 0.001 * n
+            for n, name in enumerate(controller.layout.compensation)
+            if "table" in name
+        }
         | {f"screw-cyclic-table.leg{n}.period": 2.0 for n in range(1, 7)}
     )
     block = await controller.read_parameters()
