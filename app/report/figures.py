@@ -45,6 +45,11 @@ def new_figure(
     return figure, list(axes.ravel())
 
 
+def _legend_above(axis: Axes) -> None:
+    """A legend that never covers data."""
+    axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderaxespad=0.1)
+
+
 def errors_by_pose(
     series: Sequence[tuple[str, Array, Array]], paper: tuple[float, float] | None = None
 ) -> Figure:
@@ -73,7 +78,7 @@ def errors_by_pose(
                 fontsize=8,
             )
     bottom.set_xlabel("verification pose")
-    top.legend(loc="upper right", ncols=3)
+    _legend_above(top)
     return figure
 
 
@@ -97,7 +102,7 @@ def parameter_changes(
     axis.set_xticks(number, names, rotation=90, fontsize=6)
     axis.set_ylabel(f"identified - nominal, {unit}")
     axis.set_xlim(-0.8, len(names) - 0.2)
-    axis.legend(loc="upper right", ncols=2)
+    _legend_above(axis)
     return figure
 
 
@@ -127,6 +132,8 @@ def workspace_map(position: Array, before: Array, after: Array) -> Figure:
                 )
             axis.margins(0.25)
             axis.set_title(f"{label}, z = {height:g} mm", fontsize=8.5)
+            axis.set_xlabel("x, mm" if row else "")
+            axis.set_ylabel("y, mm" if column == 0 else "")
             axis.set_aspect("equal")
             if column == len(heights) - 1:
                 figure.colorbar(dots, ax=axis, label="um", shrink=0.8)
@@ -149,7 +156,7 @@ def drift(times: Mapping[str, Array], shifts: Mapping[str, Array]) -> Figure:
     axis.set_xlabel("machine time, min")
     axis.set_ylabel("shift, um")
     axis.set_ylim(bottom=0)
-    axis.legend(ncols=4, loc="upper left", fontsize=8)
+    _legend_above(axis)
     return figure
 
 
@@ -161,5 +168,5 @@ def residual_cloud(residual_um: Array, floor_um: float) -> Figure:
     axis.set_xlabel("reading")
     axis.set_ylabel("distance, um")
     axis.set_ylim(bottom=0)
-    axis.legend(loc="upper right")
+    _legend_above(axis)
     return figure
