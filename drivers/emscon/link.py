@@ -1,12 +1,14 @@
 """The byte stream to one tracker: requests, their answers, and everything said unasked."""
 
 import asyncio
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 
 from drivers.emscon import wire
 from drivers.emscon.codes import PacketType, status_words
+from drivers.emscon.framing import Framer
 from drivers.errors import ConnectFailed, DeviceError, LinkError, LinkLost, Refused, Silence
 
 CHUNK = 65536
@@ -38,6 +40,7 @@ class EmsconLink:
         self._reader = reader
         self._writer = writer
         self._pending: _Pending | None = None
+        self._owed: deque[_Pending] = deque()
         self._turn = asyncio.Lock()
         self._on_packet: Callable[[wire.Packet], None] = lambda packet: None
         self._on_lost: Callable[[DeviceError], None] = lambda error: None
@@ -81,7 +84,7 @@ class EmsconLink:
             if self.lost is not None:
                 raise self.lost
             future: asyncio.Future[list[wire.Packet]] = asyncio.get_running_loop().create_future()
-            self._pending = _Pending(wire.COMMANDS[name].code, many, future)
+            pending = self._pending = _Pending(wire.COMMANDS[name].code, many, future)
             try:
                 self._writer.write(wire.request(name, **values))
                 async with asyncio.timeout(timeout):
@@ -96,11 +99,16 @@ class EmsconLink:
                     )
                 )
                 raise (self.lost or error) from error
+            except asyncio.CancelledError:
+                # Its answer will still come, and must not be taken for that of a later request.
+                pending.done = asyncio.get_running_loop().create_future()
+                self._owed.append(pending)
+                raise
             finally:
                 self._pending = None
 
     async def _read(self) -> None:
-        framer = wire.Framer()
+        framer = Framer()
         try:
             while chunk := await self._reader.read(CHUNK):
                 for raw in framer.feed(chunk):
@@ -118,8 +126,18 @@ class EmsconLink:
 
     def _dispatch(self, packet: wire.Packet) -> None:
         self._on_packet(packet)
-        pending = self._pending
-        if pending is None or pending.done.done() or packet.command != pending.code:
+        owed = next((p for p in self._owed if p.code == packet.command), None)
+        if owed is not None:
+            self._settle(owed, packet)
+            if owed.done.done():
+                owed.done.exception()  # nobody waits for it any more
+                self._owed.remove(owed)
+        elif self._pending is not None and self._pending.code == packet.command:
+            self._settle(self._pending, packet)
+
+    def _settle(self, pending: _Pending, packet: wire.Packet) -> None:
+        """Let a packet with the right command number answer a request."""
+        if pending.done.done():
             return
         if packet.type == PacketType.ERROR or packet.status != 0:
             name = wire.BY_CODE[pending.code].name

@@ -2,7 +2,6 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
-from dataclasses import dataclass
 
 from drivers.emscon import wire
 from drivers.emscon.codes import (
@@ -18,34 +17,18 @@ from drivers.emscon.codes import (
     Status,
     Temperature,
     TrackerStatus,
-    WeatherMonitor,
     status_words,
 )
 from drivers.emscon.link import EmsconLink
 from drivers.emscon.measurement import Measurement, refusal
 from drivers.emscon.results import reading, samples
+from drivers.emscon.settings import EmsconSettings
 from drivers.errors import BeamBroken, DeviceError, LinkLost, NoTarget, Refused, Silence
 from drivers.interface import Alarm, Identity, TrackerReading, TrackerState, TrackSample
 
 INITIALIZE_S = 90.0
 POINT_S = 60.0
 LONGEST_PACKET_GAP_S = 1.0
-
-
-@dataclass(frozen=True)
-class EmsconSettings:
-    """What is not the same in every laboratory.
-
-    ``weather_monitor`` READ_AND_COMPUTE lets the tracker compensate refraction by its own weather
-    station; with OFF it uses the last ``environment`` (deg C, hPa, relative humidity in %).
-    """
-
-    weather_monitor: WeatherMonitor = WeatherMonitor.READ_AND_COMPUTE
-    environment: tuple[float, float, float] | None = None
-    search_radius_mm: float = 20.0
-    search_timeout_s: float = 20.0
-    margin_s: float = 3.0
-    """Wall seconds that an answer may take beyond the device's own time."""
 
 
 class EmsconTracker:
@@ -276,7 +259,6 @@ class EmsconTracker:
         """End any measurement; never raises for a second call."""
         if self._measurement is not None:
             self._measurement.fail(BeamBroken("stopped by the operator", device=self._link.device))
-        if self._link.lost is None:
             await self._abort()
 
     async def close(self) -> None:

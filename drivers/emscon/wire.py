@@ -24,7 +24,6 @@ from drivers.errors import ProtocolError
 
 Value = int | float | str
 HEADER_SIZE = 8
-LARGEST_PACKET = 65536
 _FORMATS = {"i": "i", "d": "d", "s": "64s"}
 
 
@@ -333,32 +332,3 @@ def _records(packet: bytes, start: int, count: int) -> list[dict[str, Value]]:
             remedy="The tracker speaks another version of its protocol.",
         )
     return [RECORD.unpack(packet[start + i * size : start + (i + 1) * size]) for i in range(count)]
-
-
-class Framer:
-    """Cuts a byte stream into packets, however TCP has split or joined them."""
-
-    def __init__(self) -> None:
-        self._buffer = bytearray()
-
-    @property
-    def pending(self) -> int:
-        """Bytes of an incomplete packet."""
-        return len(self._buffer)
-
-    def feed(self, chunk: bytes) -> list[bytes]:
-        """Add received bytes; return the packets that are complete. Raises ProtocolError."""
-        self._buffer += chunk
-        packets = []
-        while len(self._buffer) >= HEADER_SIZE:
-            size = _HEADER.unpack_from(self._buffer)[0]
-            if not HEADER_SIZE <= size <= LARGEST_PACKET:
-                raise ProtocolError(
-                    f"a packet claims to be {size} bytes long",
-                    remedy="Reconnect; check that the address is that of a tracker.",
-                )
-            if len(self._buffer) < size:
-                break
-            packets.append(bytes(self._buffer[:size]))
-            del self._buffer[:size]
-        return packets

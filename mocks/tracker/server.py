@@ -5,6 +5,7 @@ from contextlib import suppress
 
 from drivers.emscon import wire
 from drivers.emscon.codes import UNKNOWN_COMMAND, Event, Status
+from drivers.emscon.framing import Framer
 from drivers.errors import ProtocolError
 from mocks.clock import ScaledClock
 from mocks.tracker.instrument import Instrument
@@ -85,7 +86,7 @@ class TrackerServer:
             writer.close()
 
     async def _talk(self, reader: asyncio.StreamReader) -> None:
-        framer = wire.Framer()
+        framer = Framer()
         if self.instrument.beam.locked is not None:
             self.instrument.event(Event.READY)
         while chunk := await reader.read(65536):

@@ -4,7 +4,7 @@ import pytest
 from tracker_bench import SCALE, Bench
 
 from drivers.emscon import EmsconTracker
-from drivers.emscon.tracker import EmsconSettings
+from drivers.emscon.settings import EmsconSettings
 from mocks.clock import ScaledClock
 from mocks.tracker.server import TrackerServer
 from mocks.world import World, WorldPlan

@@ -138,6 +138,25 @@ async def test_cancelled_dwell_leaves_no_result_behind(locked: Bench) -> None:
     assert np.linalg.norm(np.array(reading.xyz) - locked.nest("4")) < 0.05
 
 
+async def test_cancelled_command_does_not_answer_the_next_one(locked: Bench) -> None:
+    x, y, z = locked.nest("3")
+    nowhere = asyncio.create_task(locked.tracker.point_at((x, y, z + 200.0)))
+    await asyncio.sleep(0.001)
+    nowhere.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await nowhere
+    await locked.tracker.point_at(locked.nest("4"))
+    reading = await locked.tracker.measure(0.5)
+    assert np.linalg.norm(np.array(reading.xyz) - locked.nest("4")) < 0.05
+
+
+async def test_stop_while_the_beam_turns_does_not_wait_for_it(locked: Bench) -> None:
+    turning = asyncio.create_task(locked.tracker.point_at(locked.nest("b3")))
+    await asyncio.sleep(0)
+    await asyncio.wait_for(locked.tracker.stop(), 0.001)
+    await turning
+
+
 async def test_link_reset_in_a_dwell(locked: Bench) -> None:
     dwell = asyncio.create_task(locked.tracker.measure(20.0))
     await asyncio.sleep(0.02)

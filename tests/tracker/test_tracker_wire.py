@@ -7,6 +7,7 @@ import pytest
 
 from drivers.emscon import wire
 from drivers.emscon.codes import PacketType
+from drivers.emscon.framing import Framer
 from drivers.errors import ProtocolError
 
 # name: code, size of the request, size of the answer
@@ -132,7 +133,7 @@ def test_framing_does_not_depend_on_how_tcp_cuts() -> None:
     rng.shuffle(packets)
     stream = b"".join(packets)
     for _ in range(50):
-        framer, seen, rest = wire.Framer(), [], stream
+        framer, seen, rest = Framer(), [], stream
         while rest:
             cut = rng.randrange(1, 40)
             seen += framer.feed(rest[:cut])
@@ -144,7 +145,7 @@ def test_framing_does_not_depend_on_how_tcp_cuts() -> None:
 @pytest.mark.parametrize("size", [-1, 0, 7, 65537, 2**31 - 1])
 def test_impossible_packet_sizes_are_refused(size: int) -> None:
     with pytest.raises(ProtocolError, match="claims to be"):
-        wire.Framer().feed(struct.pack("<ii", size, 0))
+        Framer().feed(struct.pack("<ii", size, 0))
 
 
 def test_short_packets_are_refused_not_misread() -> None:
