@@ -16,14 +16,12 @@
 
 import asyncio
 import contextlib
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 from app.errors import GateRefused, StoppedByOperator
-from app.machine_files import read_text
 from app.session.events import (
     Fault,
     Finished,
@@ -38,13 +36,14 @@ from app.session.events import (
     Stopped,
 )
 from app.session.export import export_run
+from app.session.folder import JOURNAL, make_folder, read_folder
 from app.session.journal import PENDING, Journal, StepState
 from app.session.plan import Plan, Step
 from app.session.recall import recall
 from app.session.routines import EVERY_TIME, NEVER_SKIPPED, ROUTINES
 from app.session.station import Station
 from app.session.work import Done, StartOver, Work
-from app.site import Site, parse_site
+from app.site import Site
 from calib.errors import BadInput
 from drivers.errors import DeviceError
 from drivers.interface import Alarm
@@ -111,12 +110,8 @@ class Session:
         ``expected`` are the parameters that the controller should hold, where they are not those
         that this program last left there for good (during a write-back).
         """
-        folder = _new_folder(root, f"{site.machine.name}-{plan.purpose}")
-        (folder / "site.toml").write_text(site.to_toml(), encoding="utf-8")
-        (folder / "plan.json").write_text(plan.to_json(), encoding="utf-8")
-        journal = Journal(folder / "journal.sqlite")
-        journal.enter_plan(plan)
-        journal.set_meta("begun_utc", datetime.now(UTC).isoformat(timespec="seconds"))
+        folder = make_folder(root, site, plan)
+        journal = Journal(folder / JOURNAL)
         return cls(
             folder,
             plan,
@@ -137,12 +132,8 @@ class Session:
         BadInput
             If the folder holds no session.
         """
-        for name in ("plan.json", "site.toml", "journal.sqlite"):
-            if not (folder / name).is_file():
-                raise BadInput(f"no {name} here", place=str(folder), remedy="Name a session folder")
-        plan = Plan.from_json(read_text(folder / "plan.json"), str(folder / "plan.json"))
-        site = parse_site(read_text(folder / "site.toml"), str(folder / "site.toml"), folder)
-        journal = Journal(folder / "journal.sqlite")
+        site, plan = read_folder(folder)
+        journal = Journal(folder / JOURNAL)
         journal.enter_plan(plan)
         return cls(folder, plan, station or Station(site), journal, unattended=unattended)
 
@@ -368,16 +359,3 @@ class Session:
         self.journal.set_meta("finished_utc", datetime.now(UTC).isoformat(timespec="seconds"))
         self.observers.tell(Finished(str(run_folder), readings))
         return Outcome(self.folder, run_folder, readings)
-
-
-def _new_folder(root: Path, name: str) -> Path:
-    """Make a new folder named by the time of day."""
-    stamp = datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
-    for suffix in ("", *(f"-{number}" for number in range(2, 100))):
-        folder = root / f"{stamp}-{name}{suffix}"
-        try:
-            os.makedirs(folder)  # noqa: PTH103 - fails if it exists, in one step
-        except FileExistsError:
-            continue
-        return folder
-    raise BadInput("a hundred sessions in one second", place=str(root))

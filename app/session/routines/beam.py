@@ -23,9 +23,10 @@ _TRIES = 4
 async def aim(work: Work, nest: str) -> None:
     """Bring the beam to a nest, by its predicted place; raises NoTarget.
 
-    While one SMR is followed from pose to pose the beam is there already.
+    While one SMR is followed from pose to pose the beam is there already. Pointing would also turn
+    the tracker back to its first face.
     """
-    if work.memory.aimed_at == nest and nest in work.site.platform_nests:
+    if work.memory.aimed_at == nest:
         return
     x, y, z = work.predict(nest, work.memory.standing_at or "home")
     work.memory.aimed_at = ""
@@ -87,10 +88,13 @@ def _scatter(window: "deque[tuple[float, float, float]]") -> tuple[float, float]
     return float(np.sqrt(points.var(axis=0, ddof=1).sum())), float(creep)
 
 
-async def measured(work: Work, nest: str, dwell_s: float) -> tuple[TrackerReading, float]:
-    """Measure, and when the beam is lost get it back and dwell again from the beginning.
+async def measured(
+    work: Work, nest: str, dwell_s: float, *, patient: bool = True
+) -> tuple[TrackerReading, float]:
+    """Aim at a nest and measure; when the beam is lost get it back and dwell anew.
 
-    Returns the reading and when its dwell began, machine s.
+    Returns the reading and when its dwell began, machine s. Without patience a nest where nothing
+    is seen is told at once.
 
     Raises
     ------
@@ -99,19 +103,20 @@ async def measured(work: Work, nest: str, dwell_s: float) -> tuple[TrackerReadin
     """
     for attempt in range(1, _TRIES + 1):
         try:
+            await aim(work, nest)
             await settle(work)
             begun = work.clock.now()
             reading = await work.tracker.measure(dwell_s)
             _check_finite(reading)
             return reading, begun
         except (BeamBroken, NoTarget) as lost:
-            if attempt == _TRIES:
+            if attempt == _TRIES or not patient:
                 raise
             await recover(work, nest, lost)
         except NotReady as unready:
             if attempt == _TRIES:
                 raise
-            await _make_ready(work, nest, unready)
+            await _make_ready(work, unready)
     raise AssertionError("the loop returns or raises")
 
 
@@ -162,7 +167,7 @@ async def _relocked(work: Work, nest: str) -> bool:
     return True
 
 
-async def _make_ready(work: Work, nest: str, unready: NotReady) -> None:
+async def _make_ready(work: Work, unready: NotReady) -> None:
     """Initialise a tracker that forgot, wait for one that is not warm or stable."""
     work.suspended(f"the tracker is not ready: {unready.what}", unready.remedy or "Wait")
     state = await work.tracker.state()
@@ -173,5 +178,4 @@ async def _make_ready(work: Work, nest: str, unready: NotReady) -> None:
     else:
         await asyncio.sleep(2.0 * _RELOCK_WAIT_S)
     work.memory.aimed_at = ""
-    await aim(work, nest)
-    work.released("the tracker is ready again")
+    work.released("the tracker was asked again")

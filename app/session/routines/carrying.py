@@ -5,10 +5,10 @@ import numpy as np
 from app.session.frame import Array
 from app.session.journal import NewRow
 from app.session.plan import Step
-from app.session.routines.beam import aim, measured
+from app.session.routines.beam import measured
 from app.session.routines.moving import ensure_at
 from app.session.work import HOME, Done, Work
-from drivers.errors import NoTarget
+from drivers.errors import BeamBroken, NoTarget
 
 _LOOK_S = 0.5
 """Dwell of a look that only asks which nest it is, s."""
@@ -77,9 +77,8 @@ async def again(work: Work, nest: str, why: str) -> None:
 async def _look(work: Work, nest: str) -> str:
     """Return what is wrong with the SMR in a nest, or nothing."""
     try:
-        await aim(work, nest)
-        reading, _ = await measured(work, nest, _LOOK_S)
-    except NoTarget as nothing:
+        reading, _ = await measured(work, nest, _LOOK_S, patient=False)
+    except (NoTarget, BeamBroken) as nothing:
         return f"no SMR is seen there ({nothing.what})"
     return misplaced(work, nest, HOME, np.array(reading.xyz))
 

@@ -7,7 +7,7 @@ import numpy as np
 from app.session.events import ReadingTaken
 from app.session.journal import NewRow
 from app.session.plan import Step
-from app.session.routines.beam import aim, measured, recover
+from app.session.routines.beam import measured
 from app.session.routines.carrying import (
     TRIES,
     again,
@@ -20,7 +20,7 @@ from app.session.routines.moving import ensure_at
 from app.session.routines.preparing import channels
 from app.session.routines.reverifying import reverify
 from app.session.work import Done, Work
-from drivers.errors import NoTarget, NotReady
+from drivers.errors import NotReady
 from drivers.interface import TrackerReading
 
 _BAND_MARGIN_K = 0.5
@@ -64,14 +64,9 @@ async def dwell(work: Work, nest: str) -> tuple[TrackerReading, float]:
     After the beam was lost the last good reference is read again before going on.
     """
     lost_before = work.losses
-    try:
-        await aim(work, nest)
-    except NoTarget as nothing:
-        await recover(work, nest, nothing)
     reading, begun = await measured(work, nest, work.limits.dwell_s)
     if work.losses > lost_before or not work.memory.verified:
-        await reverify(work, nest)
-        await aim(work, nest)
+        await reverify(work)
         reading, begun = await measured(work, nest, work.limits.dwell_s)
     return reading, begun
 

@@ -7,13 +7,13 @@ import numpy as np
 from app.session.events import DriftChecked, FrameFound, ReadingTaken
 from app.session.frame import Array, exchanged, fit_frame
 from app.session.plan import Step
-from app.session.routines.beam import aim, measured, recover
+from app.session.routines.beam import measured
 from app.session.routines.carrying import ensure_smr, rejected_row
 from app.session.routines.moving import ensure_at
 from app.session.routines.preparing import channels
 from app.session.routines.reading import reading_row
 from app.session.work import HOME, Done, Work
-from drivers.errors import NoTarget, NotReady
+from drivers.errors import NotReady
 
 
 async def reference(work: Work, step: Step) -> Done:
@@ -22,10 +22,6 @@ async def reference(work: Work, step: Step) -> Done:
     await ensure_smr(work, nest)
     if work.memory.standing_at is None:
         await ensure_at(work, HOME)
-    try:
-        await aim(work, nest)
-    except NoTarget as nothing:
-        await recover(work, nest, nothing)
     reading, begun = await measured(work, nest, work.limits.dwell_s)
     miss = float(np.linalg.norm(np.array(reading.xyz) - work.predict(nest, HOME)))
     allowed = work.limits.hole_radius_mm
@@ -109,7 +105,6 @@ async def two_face(work: Work, step: Step) -> Done:
     """Read one base nest with both faces of the tracker; half the difference is its error."""
     nest = next(iter(work.site.base_nests))
     await ensure_smr(work, nest)
-    await aim(work, nest)
     one, _ = await measured(work, nest, 1.0)
     await work.tracker.change_face()
     two, _ = await measured(work, nest, 1.0)

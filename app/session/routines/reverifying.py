@@ -3,13 +3,13 @@
 import numpy as np
 
 from app.errors import StoppedByOperator
-from app.session.routines.beam import aim, measured
+from app.session.routines.beam import measured
 from app.session.work import StartOver, Work
 
 _LOOK_S = 1.0
 
 
-async def reverify(work: Work, nest: str) -> None:
+async def reverify(work: Work) -> None:
     """Read the last good reference again and compare.
 
     With SMRs that stay on the base, the first of them is read. Otherwise nothing but the nest
@@ -28,7 +28,6 @@ async def reverify(work: Work, nest: str) -> None:
     if not (work.site.hands.base_smrs and work.memory.last_reference):
         return
     reference = next(iter(work.memory.last_reference))
-    await aim(work, reference)
     reading, _ = await measured(work, reference, _LOOK_S)
     before = np.array(work.memory.last_reference[reference])
     shift = float(np.linalg.norm(np.array(reading.xyz) - before))
