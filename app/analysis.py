@@ -6,9 +6,11 @@ from typing import Any, TypeVar
 
 import click
 
+from app import answer
 from app.model_files import chosen_effects
 from app.run_files import read_runs
-from calib.effects import Effect
+from calib.discover.run_discovery import Refitter
+from calib.effects import Effect, catalogue
 from calib.runs.stack import Rows, stack
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -34,3 +36,21 @@ def load_rows(
     machine = loaded[0].machine
     effects, _ = chosen_effects(machine, add, model)
     return stack(machine, [one.run for one in loaded]), effects
+
+
+def load_refitter(
+    runs: tuple[str, ...], add: tuple[str, ...] = (), model: Path | None = None
+) -> tuple[Refitter, tuple[str, ...]]:
+    """Make runs ready for diagnosis: a refitter over the catalogue, and the effects to begin with.
+
+    On a terminal, every model that is looked at is told on standard error.
+    """
+    rows, effects = load_rows(runs, add, model)
+    known = {effect.id: effect for effect in (*catalogue(rows.machine), *effects)}
+    watch = _tell if answer.interactive() else None
+    refit = Refitter(rows, tuple(known.values()), watch=watch)
+    return refit, tuple(effect.id for effect in effects)
+
+
+def _tell(names: tuple[str, ...]) -> None:
+    answer.say(f"looking at baseline{''.join(' + ' + name for name in names)} ...")

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from calib.arrays import Array
+from calib.arrays import Array, BoolArray
 from calib.discover.diagnosis import Diagnosis, Finding, diagnose
 from calib.discover.run_problem import (
     EffectColumns,
@@ -17,19 +17,25 @@ from calib.discover.run_problem import (
     variables_of,
 )
 from calib.discover.structure import structure_candidates
-from calib.effects.component import Effect
+from calib.effects.component import Effect, Unknown
 from calib.identify.fitting import Fit, fit
 from calib.identify.holdout import HoldOut, hold_out, hold_out_of
-from calib.model.prediction import Model, State
+from calib.model.prediction import Model, State, whitened_columns
 from calib.runs.stack import Rows
 
 
 @dataclass(frozen=True, eq=False)
 class Outlook:
-    """What the error would be with one more effect, to first order, in mm."""
+    """What the error would be with one more effect, to first order.
+
+    ``values`` and ``sigmas`` (U,) are of all its unknowns, nonlinear ones included.
+    """
 
     rms_mm: float
     holdout: HoldOut
+    unknowns: tuple[Unknown, ...]
+    values: Array
+    sigmas: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,30 +62,53 @@ class RunDiagnosis:
     def outlook(self, finding: Finding) -> Outlook:
         """RMS and hold-out RMS with one more effect at its best trial, to first order."""
         one, fitted = self.columns_of(finding.name), self.fit
-        own = one.columns[one.trials.index(finding.trial)]
-        unknowns = [unknown for unknown in one.unknowns if not unknown.nonlinear]
-        sigma = np.array([unknown.sigma or 1e3 * unknown.size for unknown in unknowns])
-        jacobian = np.concatenate([fitted.linear.jacobian, own])
-        precision = np.concatenate([fitted.prior_precision, 1.0 / sigma**2])
-        pull = np.concatenate(
-            [
-                fitted.prior_precision * fitted.model.deviation(fitted.linear.state),
-                np.zeros(sigma.size),
-            ]
+        rows, linear = fitted.model.rows, fitted.linear
+        values = one.values(finding.trial, np.array([e.value for e in finding.estimates]))
+        signature = one.effect.signature(linear.situation, values)
+        own = whitened_columns(signature, linear.situation) * one.known
+        sigma = np.array([unknown.sigma or 1e3 * unknown.size for unknown in one.unknowns])
+        larger = _Larger(
+            np.concatenate([linear.jacobian, own]),
+            np.concatenate([fitted.prior_precision, 1.0 / sigma**2]),
+            np.concatenate(
+                [fitted.prior_precision * fitted.model.deviation(linear.state), 0.0 * sigma]
+            ),
         )
-        rows, whitened = fitted.model.rows, fitted.linear.whitened
         accepted = fitted.accepted & one.known
-        chosen = jacobian[:, :, accepted].reshape(precision.size, -1)
-        normal = chosen @ chosen.T + np.diag(precision)
-        scale = 1.0 / np.sqrt(np.diag(normal))
-        slope = chosen @ whitened[:, accepted].reshape(-1) - pull
-        step = scale * np.linalg.solve(normal * scale[:, None] * scale, scale * slope)
-        left = whitened - np.tensordot(step, jacobian, axes=1)
+        step, spread = larger.solved(linear.whitened, accepted)
+        left = linear.whitened - np.tensordot(step, larger.jacobian, axes=1)
         factors = np.linalg.inv(np.moveaxis(rows.whitener, -1, 0))[accepted]
         natural = np.einsum("nij,jn->in", factors, left[:, accepted])
-        rms = float(np.sqrt(np.mean(np.sum(natural**2, axis=0))))
-        held = hold_out_of(rows, accepted, whitened, jacobian, precision, pull)
-        return Outlook(rms, held)
+        held = hold_out_of(
+            rows, accepted, linear.whitened, larger.jacobian, larger.precision, larger.pull
+        )
+        nonlinear = np.array([unknown.nonlinear for unknown in one.unknowns])
+        count = sigma.size
+        return Outlook(
+            rms_mm=float(np.sqrt(np.mean(np.sum(natural**2, axis=0)))),
+            holdout=held,
+            unknowns=one.unknowns,
+            values=np.where(nonlinear, values, step[-count:]),
+            sigmas=spread[-count:],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Larger:
+    """The linearised model with the columns of one more effect."""
+
+    jacobian: Array
+    precision: Array
+    pull: Array
+
+    def solved(self, whitened: Array, accepted: BoolArray) -> tuple[Array, Array]:
+        """Step (p,) to the optimum, and standard uncertainties (p,)."""
+        chosen = self.jacobian[:, :, accepted].reshape(self.precision.size, -1)
+        normal = chosen @ chosen.T + np.diag(self.precision)
+        scale = 1.0 / np.sqrt(np.diag(normal))
+        covariance = np.linalg.inv(normal * scale[:, None] * scale) * scale[:, None] * scale
+        slope = chosen @ whitened[:, accepted].reshape(-1) - self.pull
+        return covariance @ slope, np.sqrt(np.diag(covariance))
 
 
 def diagnose_fit(

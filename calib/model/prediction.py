@@ -264,6 +264,8 @@ class Model:
     def _closed(
         self, extension: Array, parameters: Array, start: Configuration | None
     ) -> Configuration:
+        if start is not None and start.count != extension.shape[1]:
+            start = None  # of a model with other effects, whose distinct states are others
         closed = forward(self.machine, extension, parameters, start)
         if not closed.converged.all():
             state = int(np.argmin(closed.converged))

@@ -1,0 +1,84 @@
+"""Ask which physical effect the model misses
+
+The candidates are scored against what the fit leaves; see docs/effects.md.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from app import answer
+from app.analysis import load_refitter, model_options
+from calib.discover.run_report import diagnosis_report
+
+
+@click.command()
+@click.argument("runs", nargs=-1, required=True, metavar="RUN...")
+@model_options
+@answer.json_option
+def command(runs: tuple[str, ...], add: tuple[str, ...], model: Path | None, as_json: bool) -> None:
+    """Score every known effect against what the model leaves of RUN...
+
+    The answer says which effect is missing, how sure that is, how large it is and what adding it
+    would bring; or that nothing is missing; or that something unknown is.
+    """
+    refit, begin = load_refitter(runs, add, model)
+    report = diagnosis_report(refit(begin).run)
+    answer.show(report, as_json, words(report))
+
+
+def words(report: dict[str, Any]) -> str:
+    """Say a diagnosis to a person."""
+    base = report["baseline"]
+    lines = [
+        f"model: baseline{''.join(' + ' + name for name in base['effects'])}",
+        f"RMS {um(base['rms_um'])} (perfect model {um(base['noise_floor_um'])}), held-out poses "
+        f"{um(base['holdout_rms_um'])} (perfect {um(base['holdout_floor_um'])}), "
+        f"chi-square per degree of freedom {base['chi2_per_dof']:.3f}",
+        "",
+        answer.table(
+            ("effect", "p", "RMS after", "held-out after", "visible", "size"),
+            [_row(candidate) for candidate in report["candidates"]],
+        ),
+    ]
+    for group in report["indistinguishable"]:
+        lines += ["", f"This run cannot tell apart: {', '.join(group)}"]
+    if report["unexplained"]["significant"]:
+        channels = ", ".join(report["unexplained"]["channels"])
+        lines += ["", f"Structure is left that no known effect explains; it depends on: {channels}"]
+    lines += [*bad_lines(report), "", report["advice"]]
+    for name, why in report["unavailable"].items():
+        lines.append(f"(not asked: {name}, {why})")
+    return "\n".join(lines)
+
+
+def um(value: float | None) -> str:
+    """Micrometres, or a dash."""
+    return "-" if value is None else f"{value:.2f} um"
+
+
+def bad_lines(report: dict[str, Any]) -> list[str]:
+    """Excluded readings, one a line."""
+    if not report["bad_readings"]:
+        return []
+    listed = [f"  line {bad['line']}: {bad['why']}" for bad in report["bad_readings"]]
+    return ["", "Excluded readings:", *listed]
+
+
+def sizes(parameters: list[dict[str, Any]]) -> list[str]:
+    """Values with uncertainties in words."""
+    return [f"{p['name']} = {p['value']:.4g} +- {p['sigma']:.2g} {p['unit']}" for p in parameters]
+
+
+def _row(candidate: dict[str, Any]) -> tuple[str, ...]:
+    found = sizes(candidate["parameters"])
+    more = f" and {len(found) - 1} more" if len(found) > 1 else ""
+    return (
+        candidate["effect"],
+        f"{candidate['p_value']:.2g}",
+        um(candidate["rms_after_um"]),
+        um(candidate["holdout_rms_after_um"]),
+        f"{100 * candidate['visible']:.0f} %",
+        (found[0] + more) if candidate["p_value"] < 0.05 else "",
+    )

@@ -1,0 +1,76 @@
+"""Add missing effects one by one and watch the error fall
+
+Diagnose, add the best, refit, accept if held-out poses agree; see docs/effects.md.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from app import answer
+from app.analysis import load_refitter, model_options
+from app.model_files import write_model
+from app.verbs.diagnose import bad_lines, sizes, um
+from calib.discover.run_discovery import discover_run, stage_of
+from calib.discover.run_report import discovery_report
+
+
+@click.command()
+@click.argument("runs", nargs=-1, required=True, metavar="RUN...")
+@model_options
+@click.option(
+    "--save", type=click.Path(path_type=Path), help="Write the model with what was found to FILE."
+)
+@answer.json_option
+def command(
+    runs: tuple[str, ...],
+    add: tuple[str, ...],
+    model: Path | None,
+    save: Path | None,
+    as_json: bool,
+) -> None:
+    """Find the effects that RUN... calls for; those of --add and --model stay in.
+
+    An effect is accepted only if poses that the fit has not seen are predicted no worse with it.
+    """
+    refit, begin = load_refitter(runs, add, model)
+    found = discover_run(refit, begin)
+    report = discovery_report(found)
+    if save is not None:
+        write_model(save, stage_of(found).run.fit)
+        answer.say(f"model written to {save}")
+    answer.show(report, as_json, words(report))
+
+
+def words(report: dict[str, Any]) -> str:
+    """Say a discovery to a person: the staircase, what was found, what to do next."""
+    steps = [
+        (
+            f"+ {step['added']}"
+            if step["added"]
+            else (f"- {step['removed']}" if step.get("removed") else "start"),
+            um(step["rms_um"]),
+            um(step["noise_floor_um"]),
+            um(step["holdout_rms_um"]),
+            um(step["holdout_floor_um"]),
+            f"{step['chi2_per_dof']:.3f}",
+        )
+        for step in report["steps"]
+    ]
+    lines = [
+        answer.table(
+            ("step", "RMS", "perfect", "held-out", "perfect", "chi2/dof"),
+            steps,
+        ),
+        "",
+        f"effects found: {', '.join(report['effects']) or 'none'}",
+        *(f"  {line}" for line in sizes(report["parameters"])),
+    ]
+    lines += [
+        f"This run cannot tell apart: {', '.join(group)}" for group in report["indistinguishable"]
+    ]
+    if report["unexplained"]["significant"]:
+        channels = ", ".join(report["unexplained"]["channels"])
+        lines.append(f"Structure is left that no known effect explains; it depends on: {channels}")
+    return "\n".join([*lines, *bad_lines(report), "", report["advice"]])

@@ -1,0 +1,194 @@
+"""What diagnosis and discovery say: ``pkm-diagnosis/1`` and ``pkm-discovery/1``, and in words."""
+
+import math
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from calib.arrays import Array
+from calib.discover.diagnosis import Diagnosis, Finding
+from calib.discover.forward import Discovery
+from calib.discover.run_diagnosis import RunDiagnosis
+from calib.discover.run_discovery import RunStage, stage_of
+from calib.effects.component import Unknown
+from calib.identify.fitting import Fit
+from calib.identify.report import bad_readings, quality
+
+SMALLEST_P = 1e-300
+
+
+def diagnosis_report(found: RunDiagnosis) -> dict[str, Any]:
+    """Answer of ``pkmcal diagnose --json``."""
+    diagnosis = found.diagnosis
+    return {
+        "format": "pkm-diagnosis/1",
+        "baseline": {
+            "effects": [effect.id for effect in found.fit.model.effects],
+            **_quality(found),
+        },
+        "adequate": diagnosis.adequate,
+        "candidates": [_candidate(found, finding) for finding in diagnosis.findings],
+        "indistinguishable": [list(group) for group in diagnosis.indistinguishable],
+        "unexplained": _unexplained(diagnosis),
+        "bad_readings": bad_readings(found.fit),
+        "unavailable": found.unavailable,
+        "advice": advice(found),
+    }
+
+
+def discovery_report(discovery: Discovery) -> dict[str, Any]:
+    """Answer of ``pkmcal discover --json``."""
+    last = stage_of(discovery).run
+    return {
+        "format": "pkm-discovery/1",
+        "steps": [
+            {
+                "added": step.added,
+                **({"removed": step.removed} if step.removed else {}),
+                **_quality(stage_of(discovery, number).run),
+            }
+            for number, step in enumerate(discovery.steps)
+        ],
+        "effects": list(discovery.last.effects),
+        "adequate": last.diagnosis.adequate,
+        "indistinguishable": [list(group) for group in _groups(discovery)],
+        "unexplained": _unexplained(last.diagnosis),
+        "bad_readings": bad_readings(last.fit),
+        "parameters": effect_parameters(last.fit),
+        "refused": list(discovery.refused),
+        "advice": advice(last),
+    }
+
+
+def _groups(discovery: Discovery) -> list[tuple[str, ...]]:
+    last = discovery.last.diagnosis.indistinguishable
+    return list(dict.fromkeys((*discovery.indistinguishable, *last)))
+
+
+def _quality(found: RunDiagnosis) -> dict[str, float | None]:
+    return {
+        **quality(found.fit),
+        "holdout_rms_um": _um(found.holdout.rms_mm),
+        "holdout_floor_um": _um(found.holdout.floor_mm),
+    }
+
+
+def _candidate(found: RunDiagnosis, finding: Finding) -> dict[str, Any]:
+    outlook = found.outlook(finding)
+    names = [unknown.name for unknown in outlook.unknowns]
+    acting = [name in finding.acting for name in names]
+    return {
+        "effect": finding.name,
+        "p_value": max(finding.p_value, SMALLEST_P),
+        "rms_after_um": _um(outlook.rms_mm),
+        "holdout_rms_after_um": _um(outlook.holdout.rms_mm),
+        "visible": finding.visible,
+        "parameters": _significant(outlook.unknowns, outlook.values, outlook.sigmas, acting),
+    }
+
+
+def effect_parameters(fit: Fit) -> list[dict[str, Any]]:
+    """Unknowns of the effects in a model, those that are significant among many of a kind."""
+    listed: list[dict[str, Any]] = []
+    at = fit.model.free.size
+    for group in fit.model.unknowns:
+        here = slice(at, at + len(group))
+        at += len(group)
+        listed += _significant(group, fit.values[here], fit.sigmas[here], [False] * len(group))
+    return listed
+
+
+def _significant(
+    unknowns: tuple[Unknown, ...], values: Array, sigmas: Array, acting: list[bool]
+) -> list[dict[str, Any]]:
+    """Entries of the unknowns that differ from zero; of all if none does or there is but one.
+
+    Several linear unknowns of a kind share 5 %; nonlinear ones are always listed.
+    """
+    linear = np.array([not unknown.nonlinear for unknown in unknowns])
+    limit = float(stats.norm.isf(0.025 / max(1, int(linear.sum()))))
+    clear = np.abs(values) > limit * sigmas
+    if linear.sum() == 1 or not np.any(clear & linear):
+        shown = linear & (np.array(acting) | ~np.any(acting))
+    else:
+        shown = clear & linear
+    shown = shown | ~linear
+    return [
+        {
+            "name": unknown.name,
+            "value": float(value),
+            "sigma": float(sigma),
+            "unit": unknown.unit,
+        }
+        for unknown, value, sigma, show in zip(unknowns, values, sigmas, shown, strict=True)
+        if show
+    ]
+
+
+def _unexplained(diagnosis: Diagnosis) -> dict[str, Any]:
+    unexplained = diagnosis.unexplained
+    periods = {d.channel: d.period for d in unexplained.dependences if d.period is not None}
+    return {
+        "significant": unexplained.significant,
+        "channels": list(unexplained.channels),
+        **({"periods": periods} if periods else {}),
+    }
+
+
+def advice(found: RunDiagnosis) -> str:
+    """One sentence for the operator: what to do next."""
+    diagnosis = found.diagnosis
+    bad = len(found.fit.bad)
+    excluded = f" {_readings(bad)} excluded: see bad_readings." if bad else ""
+    if diagnosis.adequate:
+        return f"Nothing is missing: the model explains the readings to their noise.{excluded}"
+    best = diagnosis.best
+    if best is None:
+        return (
+            f"Something is missing that no known effect explains; {_depends(diagnosis)}.{excluded}"
+        )
+    outlook = found.outlook(best)
+    says = found.columns_of(best.name).effect.says
+    text = (
+        f"Add {best.name} ({says}): the error on held-out poses falls from "
+        f"{1000 * found.holdout.rms_mm:.1f} to {1000 * outlook.holdout.rms_mm:.1f} um"
+    )
+    rivals = [name for group in diagnosis.indistinguishable if best.name in group for name in group]
+    others = [name for name in rivals if name != best.name]
+    if others:
+        text += (
+            f"; this run cannot tell it from {', '.join(others)}: pkmcal design --discriminate "
+            f"{best.name} {others[0]} plans the readings that can"
+        )
+    return f"{text}.{excluded}"
+
+
+def _depends(diagnosis: Diagnosis) -> str:
+    """On what the unexplained rest depends, strongest first."""
+    strongest = diagnosis.unexplained.dependences[:1]
+    if not strongest:
+        return "on what it depends does not show"
+    channel, period = strongest[0].channel, strongest[0].period
+    if channel == "pose":
+        return "it depends on the pose"
+    if period is None:
+        return f"it depends on {channel}"
+    if channel != "time_s":
+        return f"it depends on {channel} with a period of {period:.3g}"
+    length = f"{period / 60:.0f} min" if period >= 120 else f"{period:.0f} s"
+    return f"it depends on time with a period of {length}"
+
+
+def _readings(count: int) -> str:
+    return "One reading is" if count == 1 else f"{count} readings are"
+
+
+def _um(millimetres: float) -> float | None:
+    value = 1000.0 * millimetres
+    return value if math.isfinite(value) else None
+
+
+def staircase(discovery: Discovery) -> list[RunStage]:
+    """Stages of a discovery in order."""
+    return [stage_of(discovery, number) for number in range(len(discovery.steps))]
