@@ -17,6 +17,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -35,7 +36,7 @@ from mocks.tracker.server import TrackerServer
 from mocks.world import World, WorldPlan
 
 CONTROLLER_NODE = 10
-CONTROLLER_SERIAL = 1001
+FIRST_SERIAL = 1000
 FRAME_ERROR_MM, FRAME_ERROR_RAD = 3.0, 0.003
 
 
@@ -48,11 +49,13 @@ class MockStation:
         clock: ScaledClock,
         nvm: Path | None = None,
         ports: tuple[int, int, int] = (0, 0, 0),
+        serial: int | None = None,
     ) -> None:
         self.world = world
         self.clock = clock
+        self.serial = serial if serial is not None else _serial(world.plan.seed, nvm)
         host = "127.0.0.1"
-        self.can = CanopenStation(world, nvm, host, ports[0], CONTROLLER_SERIAL)
+        self.can = CanopenStation(world, nvm, host, ports[0], self.serial)
         self.tracker = TrackerServer(world, clock, host, ports[1])
         self.control = ControlServer(Hands(world, self.tracker, self.can), host, ports[2])
 
@@ -95,7 +98,7 @@ class MockStation:
             "machine": self.world.machine.name,
             "controller": {
                 "kind": "canopen", "interface": "slcan", "channel": self.channel,
-                "node": CONTROLLER_NODE, "serial": str(CONTROLLER_SERIAL),
+                "node": CONTROLLER_NODE, "serial": str(self.serial),
             },
             "tracker": {
                 "kind": "emscon", "address": self.tracker.address, "serial": str(SERIAL),
@@ -126,6 +129,15 @@ class MockStation:
         return [round(f + w * float(rng.normal()), 4) for f, w in zip(exact, wrong, strict=True)]
 
 
+def _serial(seed: int, nvm: Path | None) -> int:
+    """Serial number of the controller.
+
+    One whose memory ends with its process is another controller each time: a program that
+    remembers what it wrote to a controller must not expect it there.
+    """
+    return FIRST_SERIAL + seed if nvm is not None else int(time.time() * 10.0) % 10**8
+
+
 def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m mocks.station",
@@ -139,6 +151,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--truth", type=Path, help="true parameters (TOML or JSON)")
     parser.add_argument("--hidden", type=Path, help="hidden effects (TOML or JSON)")
     parser.add_argument("--nvm", type=Path, help="file of the controller's stored parameters")
+    parser.add_argument("--serial", type=int, help="of the controller; else new without --nvm")
     parser.add_argument("--smrs", type=int, choices=[1, 3], default=1)
     parser.add_argument("--no-base-smrs", action="store_true", help="base nests are empty")
     parser.add_argument("--payload", type=float, default=0.0, help="kg")
@@ -169,7 +182,7 @@ def build(options: argparse.Namespace) -> MockStation:
     world = World(clock, plan)
     world.payload_kg = options.payload
     ports = (options.can_port, options.tracker_port, options.control_port)
-    return MockStation(world, clock, options.nvm, ports)
+    return MockStation(world, clock, options.nvm, ports, options.serial)
 
 
 async def run(options: argparse.Namespace) -> None:

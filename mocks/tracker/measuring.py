@@ -13,7 +13,7 @@ from mocks.tracker.sensor import Dwell
 if TYPE_CHECKING:
     from mocks.tracker.instrument import Instrument
 
-TICK_WALL_S = 0.02
+TICK_WALL_S = 0.004
 MOST_RECORDS = 400
 MOST_SCATTER_MM = 0.1
 

@@ -206,3 +206,15 @@ def test_site_file_and_hidden_effects(tmp_path: Path) -> None:
         assert [places[f"smr{i}"] for i in (1, 2, 3)] == ["3", "4", "5"]
     process.communicate(timeout=10)
     assert process.returncode == 0
+
+
+def test_controller_with_a_memory_keeps_its_serial_number(tmp_path: Path) -> None:
+    def serial(*arguments: str) -> str:
+        process = launch("--json", "--seed", "9", "--until-stdin-closes", *arguments)
+        found = line_of(process)["site"]["controller"]["serial"]
+        process.communicate(timeout=10)
+        return str(found)
+
+    nvm = str(tmp_path / "nvm.json")
+    assert serial("--nvm", nvm) == serial("--nvm", nvm) == "1009"
+    assert serial() != serial()
