@@ -7,7 +7,7 @@ import pytest
 from calib.discover import diagnose
 
 LADDER = [
-    # fitted, RMS in arc seconds, terms that must come first, share of what is left that they explain
+    # fitted, RMS in arc seconds, who must come first, share of what is left that it explains
     (["IA", "IE"], 10.51, {"AW"}, 0.67),
     (["IA", "IE", "AN", "AW"], 5.71, {"CA", "NPAE"}, 0.55),
     (["IA", "IE", "AN", "AW", "CA", "NPAE"], 3.83, {"TF"}, 0.87),
