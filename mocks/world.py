@@ -159,14 +159,11 @@ class World:
 def true_geometry(parameters: Mapping[str, float], hidden: Hidden) -> HexapodGeometry:
     """Geometry with the hidden tilts of the joints' first axes."""
 
-    def tilt(side: str) -> Array:
-        columns = [
-            sum(hidden.legs(f"joint-tilt.*.{side}{mark}{axis}") for mark in ("", "_", "."))
-            for axis in "yz"
-        ]
-        return np.stack([np.asarray(c) for c in columns], axis=1)
+    def tilt(body: str) -> Array:
+        angles = [hidden.legs(f"joint-tilt.*.{body}.{axis}") for axis in "yz"]
+        return np.stack(angles, axis=1)
 
-    return geometry(parameters, tilt("B"), tilt("P"))
+    return geometry(parameters, tilt("base"), tilt("platform"))
 
 
 def home_twist(g: HexapodGeometry) -> Array:

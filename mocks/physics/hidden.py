@@ -36,14 +36,13 @@ _CATALOGUE = (
     r"screw-cyclic\.period",
     rf"backlash\.{_LEG}",
     r"screw-twist\.L",
-    rf"joint-tilt\.{_LEG}\.(B|P)[._]?(y|z)",
+    rf"joint-tilt\.{_LEG}\.(base|platform)\.(y|z)",
     r"settling\.(k|tau)",
     r"tracker-scale\.k",
     r"tracker-offset\.r0",
     r"tracker-drift\.([vw][xyz]|duration)",
     r"nest-offset\.[^.]+\.[xyz]",
-    r"frame-shift\.((base|platform)\.)?(x|y|z|rx|ry|rz)",
-    r"frame-shift\.t0",
+    r"frame-shift\.(x|y|z|rx|ry|rz|t0|where)",
 )
 _UNKNOWN = (
     rf"screw-quadratic\.{_LEG}",

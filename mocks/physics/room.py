@@ -63,8 +63,10 @@ class Distortions:
         self._wobble = hidden.get("unknown.wobble.amplitude")
         self._wobble_rad = np.radians(hidden.get("unknown.wobble.period", 7.0))
         self._shift_time = hidden.get("frame-shift.t0", np.inf)
-        self._shift_base = _shift(hidden, "frame-shift.base") + _shift(hidden, "frame-shift")
-        self._shift_platform = _shift(hidden, "frame-shift.platform")
+        shift = hidden.vector("frame-shift", "x y z rx ry rz")
+        of_base = hidden.get("frame-shift.where") > 0.5
+        self._shift_base: Array = shift if of_base else np.zeros(6)
+        self._shift_platform: Array = np.zeros(6) if of_base else shift
         self._flex = hidden.get("unknown.platform-flex.k")
         self._nests = {
             nest: hidden.vector(f"nest-offset.{nest}") for nest in (*PLATFORM_NESTS, *BASE_NESTS)
@@ -102,7 +104,3 @@ class Distortions:
         heave = heave + self._wobble * np.sin(2.0 * np.pi * azimuth / self._wobble_rad)
         seen[:, 2] += heave
         return np.asarray(seen)
-
-
-def _shift(hidden: Hidden, stem: str) -> Array:
-    return hidden.vector(stem, "x y z rx ry rz")

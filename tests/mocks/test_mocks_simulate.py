@@ -70,7 +70,7 @@ def test_noise_does_not_shift_what_else_the_seed_draws() -> None:
 @pytest.mark.parametrize(
     "hidden",
     [{}, {"backlash.leg2": 0.02, "screw-pitch.leg1": 1e-3}, {"screw-twist.L": 2.0},
-     {"gravity-sag.c": 1e-4, "nest-offset.4.x": 0.05, "joint-tilt.leg1.B_y": 1e-3},
+     {"gravity-sag.c": 1e-4, "nest-offset.4.x": 0.05, "joint-tilt.leg1.base.y": 1e-3},
      {"unknown.hysteresis.leg3": 0.02, "tracker-scale.k": 1e-5}],
 )  # fmt: skip
 def test_simulated_and_live_machine_are_the_same(hidden: dict[str, float]) -> None:

@@ -142,7 +142,7 @@ def test_settling_fades_with_its_time_constant() -> None:
     assert z[0] > 0.0
 
 
-@pytest.mark.parametrize("name", ["joint-tilt.leg2.B_y", "joint-tilt.leg4.P_z"])
+@pytest.mark.parametrize("name", ["joint-tilt.leg2.base.y", "joint-tilt.leg4.platform.z"])
 def test_joint_tilt_moves_the_platform_a_little(name: str) -> None:
     tilted, plain = world({name: 5e-3}), world()
     extension = [8.0, -8.0, 6.0, -6.0, 4.0, -4.0]
@@ -198,14 +198,19 @@ def test_nest_offset_is_in_the_platform() -> None:
 
 
 def test_frame_shift_comes_at_its_time() -> None:
-    hidden = {"frame-shift.base.z": 0.2, "frame-shift.base.rz": 1e-3, "frame-shift.t0": 50.0}
+    hidden = {
+        "frame-shift.z": 0.2,
+        "frame-shift.rz": 1e-3,
+        "frame-shift.t0": 50.0,
+        "frame-shift.where": 1,
+    }
     before, plain = seen(hidden, "b1", 49.0)
     assert before == pytest.approx(plain)
     after, plain = seen(hidden, "b1", 51.0)
     assert np.linalg.norm(after - plain) == pytest.approx(np.hypot(0.2, 260e-3), rel=1e-3)
-    tool, plain = seen({"frame-shift.platform.x": 0.1, "frame-shift.t0": 50.0}, "b1", 51.0)
+    tool, plain = seen({"frame-shift.x": 0.1, "frame-shift.t0": 50.0}, "b1", 51.0)
     assert tool == pytest.approx(plain)
-    tool, plain = seen({"frame-shift.platform.x": 0.1, "frame-shift.t0": 50.0}, "3", 51.0)
+    tool, plain = seen({"frame-shift.x": 0.1, "frame-shift.t0": 50.0}, "3", 51.0)
     assert np.linalg.norm(tool - plain) == pytest.approx(0.1, rel=1e-6)
 
 
