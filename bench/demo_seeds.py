@@ -38,3 +38,7 @@ def main(arguments: list[str]) -> None:
             flush=True,
         )
     print(f"{good} of {count} within {POSITION_UM:g} um and {ORIENTATION_DEG:g} deg")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
