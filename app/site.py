@@ -168,20 +168,21 @@ def parse_site(text: str, source: str, folder: Path) -> Site:
     )
     nests.end()
     top.end()
-    _check_nests(site, top)
+    _check_nests(site, base)
     return site
 
 
-def _check_nests(site: Site, top: TableReader) -> None:
+def _check_nests(site: Site, base: TableReader) -> None:
     if len(site.base_nests) < 3:
-        raise top.wrong(
-            "nests", f"{len(site.base_nests)} base nests", "At least three tie tracker and base"
+        raise base.wrong(
+            "", f"{len(site.base_nests)} base nests", "At least three tie tracker and base"
         )
     if len(site.platform_nests) < 1:
-        raise top.wrong("nests", "no platform nest", "Give at least one in [nests.platform]")
+        raise base.wrong("", "no platform nest", "Give at least one in [nests.platform]")
     both = set(site.base_nests) & set(site.platform_nests)
     if both:
-        raise top.wrong("nests", f'nest "{min(both)}" is on both', "Give every nest its own name")
+        name = min(both)
+        raise base.wrong(name, f'nest "{name}" is on both', "Give every nest its own name")
 
 
 def _controller(table: TableReader) -> ControllerSite:

@@ -9,7 +9,7 @@ from app.session.plan import Plan
 from app.site import Site, parse_site
 from calib.errors import BadInput
 
-SITE, PLAN, JOURNAL = "site.toml", "plan.json", "journal.sqlite"
+SITE, PLAN, JOURNAL, RUN = "site.toml", "plan.json", "journal.sqlite", "run"
 _DRAFT = "draft-"
 
 

@@ -36,7 +36,7 @@ from app.session.events import (
     Stopped,
 )
 from app.session.export import export_run
-from app.session.folder import JOURNAL, make_folder, read_folder
+from app.session.folder import JOURNAL, RUN, make_folder, read_folder
 from app.session.journal import PENDING, Journal, StepState
 from app.session.plan import Plan, Step
 from app.session.recall import recall
@@ -253,6 +253,9 @@ class Session:
             await self._end(watch)
             leave()
             self._driving = None
+            if self.work.readings:
+                # Also of a session that ended early: what was read is of use already.
+                export_run(self.work.site, self.plan, self.journal, self.folder / RUN)
         return self._finish()
 
     async def _drive(self) -> None:
@@ -341,7 +344,8 @@ class Session:
     async def _end(self, task: "asyncio.Task[None]") -> None:
         """Cancel a task and wait until it has ended; its own error is already known."""
         task.cancel()
-        with contextlib.suppress(asyncio.CancelledError, DeviceError):
+        ended = (asyncio.CancelledError, DeviceError, StoppedByOperator, GateRefused)
+        with contextlib.suppress(*ended):
             await task
 
     def _stopped(self) -> StoppedByOperator:
@@ -354,7 +358,7 @@ class Session:
         self.work.note("alarm", f"{alarm.device}: {alarm.what}")
 
     def _finish(self) -> Outcome:
-        run_folder = export_run(self.work.site, self.plan, self.journal, self.folder / "run")
+        run_folder = self.folder / RUN
         readings = sum(row.kind == "reading" for row in self.journal.rows())
         self.journal.set_meta("finished_utc", datetime.now(UTC).isoformat(timespec="seconds"))
         self.observers.tell(Finished(str(run_folder), readings))

@@ -82,3 +82,34 @@ class Heard:
 
     def said(self) -> str:
         return "\n".join(str(event) for event in self.events)
+
+
+def site_text(smrs: int = 1) -> str:
+    """A site file of a lab that does not exist."""
+    return f"""format = "pkm-site/1"
+machine = "hexapod"
+
+[controller]
+kind = "canopen"
+channel = "socket://127.0.0.1:9"
+
+[tracker]
+kind = "emscon"
+address = "127.0.0.1:9"
+frame = [-900.0, -900.0, -400.0, 0.0, 0.0, 0.3]
+
+[nests.platform]
+"3" = [0.0, 100.0, 0.0]
+"4" = [-86.60254, -50.0, 0.0]
+"5" = [86.60254, -50.0, 0.0]
+
+[nests.base]
+b1 = [260.0, 0.0, -30.0]
+b2 = [0.0, 260.0, -30.0]
+b3 = [-260.0, 0.0, -30.0]
+b4 = [0.0, -260.0, -30.0]
+
+[hands]
+kind = "operator"
+smrs = {smrs}
+"""

@@ -1,0 +1,111 @@
+"""The command line as a whole: the list of tasks, exit codes, words, one JSON object."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from session_mock import POSES, Mock, site_text
+
+from app import answer
+from app.cli import TASKS, VERBS, pkmcal, run
+from app.poses_file import poses_text
+
+
+def cli(*arguments: str, folder: Path) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        [sys.executable, "-c", "from app.cli import main; main()", *arguments],
+        cwd=folder, env=os.environ, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+
+
+def two_poses(folder: Path) -> str:
+    path = folder / "poses.csv"
+    path.write_text(poses_text({k: POSES[k] for k in "ab"}), encoding="utf-8")
+    return str(path)
+
+
+def test_help_lists_the_tasks_in_working_order_without_importing_them() -> None:
+    code = "import sys; from app.cli import run; run(['--help']); print('numpy' in sys.modules)"
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout
+    assert said.splitlines()[-1] == "False"
+    there = [v for _, verbs in TASKS for v in verbs if (VERBS / f"{v}.py").exists()]
+    places = [said.index(f"\n  {verb} ") for verb in there]
+    assert places == sorted(places)
+    assert {"measure", "resume", "apply", "undo", "verify", "mock"} <= set(there)
+
+
+@pytest.mark.parametrize("verb", sorted(p.stem for p in VERBS.glob("[a-z]*.py")))
+def test_every_verb_explains_itself(verb: str) -> None:
+    result = CliRunner().invoke(pkmcal, [verb, "--help"])
+    if verb != "mock":  # its help is the station's own
+        assert result.exit_code == 0
+        assert "Usage:" in result.output
+
+
+def test_bad_usage_and_bad_input_end_with_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["no-such-verb"]) == 2
+    assert run(["measure", "--site", str(tmp_path / "absent"), "--poses", "x"]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "absent" in said.err
+    assert run(["resume", str(tmp_path)]) == 2
+    assert "no plan.json" in capsys.readouterr().err
+
+
+def test_nobody_at_the_address_ends_with_3(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    site = tmp_path / "site.toml"
+    site.write_text(site_text(), encoding="utf-8")
+    arguments = ["measure", "--site", str(site), "--poses", two_poses(tmp_path)]
+    assert run([*arguments, "--folder", str(tmp_path), "--json"]) == 3
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "Check address" in said.err
+
+
+def test_an_interrupt_ends_with_4_and_resume_answers_one_json_object(
+    mock_of: Callable[..., Mock], tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3", scale=60)
+    site = str(mock.site_file(tmp_path))
+    command = ["measure", "--site", site, "--poses", two_poses(tmp_path), "--no-warm-up"]
+    process = subprocess.Popen(
+        [sys.executable, "-c", "from app.cli import main; main()", *command],
+        cwd=tmp_path, env=os.environ, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    deadline = time.monotonic() + 30.0
+    while not mock.hands("truth")["moving"] and time.monotonic() < deadline:
+        time.sleep(0.005)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=20)
+    assert process.returncode == 4, said
+    assert "pkmcal resume" in said
+    assert not mock.hands("truth")["moving"]
+    again = cli("resume", "--json", folder=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert json.loads(again.stdout)["readings"] == 14
+
+
+def test_a_refusing_gate_ends_with_5(mock_of: Callable[..., Mock], tmp_path: Path) -> None:
+    site = str(mock_of("--smrs", "3").site_file(tmp_path))
+    far = tmp_path / "far.csv"
+    far.write_text(poses_text({"far": (25.0, 25.0, 240.0, 0.26, 0.26, 0.35)}), encoding="utf-8")
+    refused = cli("measure", "--site", site, "--poses", str(far), folder=tmp_path)
+    assert refused.returncode == 5
+    assert "pose far" in refused.stderr
+    assert "Traceback" not in refused.stderr
+
+
+def test_numbers_that_json_cannot_say_become_null(capsys: pytest.CaptureFixture[str]) -> None:
+    answer.print_json({"a": float("nan"), "b": [1.5, float("inf")], "c": "nan"})
+    assert json.loads(capsys.readouterr().out) == {"a": None, "b": [1.5, None], "c": "nan"}

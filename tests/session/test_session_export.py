@@ -1,0 +1,45 @@
+"""From rows to points.csv: order, moves without a reading, and a reader that agrees."""
+
+from app.session.export import points_text
+from app.session.journal import Row
+
+Q0, Q1, Q2 = (230.0,) * 6, (231.0,) * 6, (232.0,) * 6
+
+
+def row(kind: str, time_s: float, pose: str, q: tuple[float, ...], nest: str = "") -> Row:
+    reading = kind == "reading"
+    return Row(
+        seq=0, step="", kind=kind, status="good", why="", time_s=time_s, pose=pose, nest=nest, q=q,
+        xyz=(1.0, 2.0, 3.0) if reading else None,
+        covariance=(4e-6, 9e-6, 16e-6, 1e-7, 0.0, 0.0) if reading else None,
+        delay_s=2.0 if reading else None, cycle=None,
+        channels={"air_temp_C": 20.5} if reading else {}, raw={},
+    )  # fmt: skip
+
+
+def lines(rows: list[Row]) -> list[list[str]]:
+    return [line.split(",") for line in points_text(rows, 6).splitlines()]
+
+
+def test_a_move_without_a_reading_stays_and_one_that_was_read_goes() -> None:
+    table = lines(
+        [
+            row("move", 0.0, "a", Q0),
+            row("reading", 1.0, "a", Q0, "3"),
+            row("move", 2.0, "b", Q1),
+            row("move", 3.0, "c", Q2),
+            row("reading", 4.0, "c", Q2, "3"),
+        ]
+    )
+    assert [(cells[1], cells[2]) for cells in table[1:]] == [("a", "3"), ("b", ""), ("c", "3")]
+    assert table[2][9:19] == [""] * 10
+
+
+def test_times_never_decrease_and_sigmas_come_from_the_covariance() -> None:
+    table = lines([row("reading", 5.0, "a", Q0, "3"), row("reading", 4.9, "a", Q0, "4")])
+    header = table[0]
+    assert [cells[0] for cells in table[1:]] == ["5.000", "5.000"]
+    sigma = [float(table[1][header.index(name)]) for name in ("sx", "sy", "sz")]
+    assert sigma == [0.002, 0.003, 0.004]
+    assert float(table[1][header.index("sxy")]) == 1e-7
+    assert table[1][header.index("air_temp_C")] == "20.5"

@@ -1,0 +1,48 @@
+"""Rigid fits: laws over random frames."""
+
+import numpy as np
+import pytest
+
+from app.session.frame import Frame, exchanged, fit_frame, nest_in_base
+
+POINTS = np.array([[260.0, 0, -30], [0, 260.0, -30], [-260.0, 0, -30], [0, -250.0, -10]]).T
+
+
+def random_frame(seed: int) -> Frame:
+    generator = np.random.default_rng(seed)
+    print(f"seed {seed}")
+    return Frame.of([*generator.normal(0, 1000, 3), *generator.uniform(-1.4, 1.4, 3)])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_fit_finds_the_frame_and_the_inverse_undoes_it(seed: int) -> None:
+    frame = random_frame(seed)
+    found, rms = fit_frame(POINTS, frame.apply(POINTS))
+    assert rms < 1e-9
+    assert found.numbers() == pytest.approx(frame.numbers(), abs=1e-9)
+    assert frame.inverse().apply(frame.apply(POINTS)) == pytest.approx(POINTS, abs=1e-9)
+    both = frame.after(random_frame(seed + 100))
+    assert both.apply(POINTS) == pytest.approx(
+        frame.apply(random_frame(seed + 100).apply(POINTS)), abs=1e-9
+    )
+
+
+def test_a_mirrored_set_is_never_fitted_by_a_reflection() -> None:
+    found, rms = fit_frame(POINTS, POINTS * np.array([[1.0], [-1.0], [1.0]]))
+    assert np.linalg.det(found.rotation) == pytest.approx(1.0)
+    assert rms > 1.0
+
+
+def test_exchanged_labels_are_named() -> None:
+    # A square of nests would fit turned by 90 degrees: these four have no such symmetry.
+    names = ("b1", "b2", "b3", "b4")
+    drawn = {name: POINTS[:, k] for k, name in enumerate(names)}
+    seen = {name: random_frame(3).apply(point) for name, point in drawn.items()}
+    seen["b1"], seen["b2"] = seen["b2"], seen["b1"]
+    _, rms = fit_frame(POINTS, np.stack([seen[name] for name in names], axis=1))
+    assert exchanged(drawn, seen, rms) == {"b1": "b2", "b2": "b1"}
+
+
+def test_a_nest_of_a_turned_platform() -> None:
+    place = nest_in_base((1.0, 2.0, 220.0, 0.0, 0.0, np.pi / 2), (0.0, 100.0, 0.0))
+    assert place == pytest.approx([-99.0, 2.0, 220.0])

@@ -1,0 +1,91 @@
+"""Plans: stable numbered steps, readable back, and a path that is checked as a whole."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from session_mock import POSES, site_text
+
+from app.errors import GateRefused
+from app.session.path import check_waypoints, waypoints
+from app.session.plan import Plan
+from app.session.plans import Order, PlanOptions, measure_plan
+from app.session.routines import ROUTINES
+from app.site import Site, parse_site
+from calib.errors import BadInput
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Site:
+    return parse_site(site_text(smrs=3), "site.toml", tmp_path)
+
+
+@pytest.mark.parametrize("order", ["nest-by-nest", "pose-by-pose"])
+def test_every_pose_is_read_in_every_nest_once_a_cycle(site: Site, order: Order) -> None:
+    plan = measure_plan(site, POSES, PlanOptions(order=order, cycles=2, reference_every=4))
+    reads = [
+        (s.args["pose"], s.args["nest"], s.args["cycle"]) for s in plan.steps if s.kind == "read"
+    ]
+    wanted = {(p, n, c) for p in POSES for n in site.platform_nests for c in (1, 2)}
+    assert set(reads) == wanted
+    assert len(reads) == len(wanted)
+    assert len({s.id for s in plan.steps}) == len(plan.steps)
+    assert {s.kind for s in plan.steps} <= set(ROUTINES)
+    groups = [s.args["group"] for s in plan.steps if s.kind == "drift"]
+    assert groups[0] == "start"
+    assert groups[-1] == "end"
+    assert len(groups) > 3
+
+
+def test_nothing_moves_before_the_path_is_checked(site: Site) -> None:
+    kinds = [step.kind for step in measure_plan(site, POSES, PlanOptions()).steps]
+    moving = [kinds.index(kind) for kind in ("home", "move", "drives")]
+    assert kinds.index("connect") < kinds.index("check-path") < min(moving)
+    assert kinds[-1] == "rest"
+
+
+def test_the_same_campaign_gives_the_same_identifiers_and_reads_back(site: Site) -> None:
+    plan = measure_plan(site, POSES, PlanOptions())
+    assert plan == measure_plan(site, POSES, PlanOptions())
+    assert Plan.from_json(plan.to_json(), "plan.json") == plan
+
+
+def test_a_file_that_is_no_plan_is_named() -> None:
+    with pytest.raises(BadInput, match=r"plan\.json"):
+        Plan.from_json('{"format": "another"}', "plan.json")
+
+
+def test_pose_by_pose_needs_an_smr_in_each_nest(tmp_path: Path) -> None:
+    site = parse_site(site_text(smrs=1), "site.toml", tmp_path)
+    with pytest.raises(BadInput, match="the site has 1"):
+        measure_plan(site, POSES, PlanOptions(order="pose-by-pose"))
+
+
+def test_waypoints_are_the_poses_in_order_without_standing_still(site: Site) -> None:
+    path = waypoints(measure_plan(site, POSES, PlanOptions(order="pose-by-pose")))
+    assert path == ["home", *POSES, "home"]
+    assert all(a != b for a, b in pairwise(path))
+
+
+def test_a_way_between_two_good_poses_that_leaves_the_strokes_is_refused(site: Site) -> None:
+    machine = site.machine
+    # Both ends turn the platform as far as the legs reach, in opposite directions and heights.
+    poses = [machine.home, (0.0, 0.0, 205.0, 0.0, 0.0, 0.30), (0.0, 0.0, 235.0, 0.0, 0.0, -0.30)]
+    least = check_waypoints(machine, {}, poses[:2], ["home", "low"])
+    assert least > 0.0
+    with pytest.raises(GateRefused) as refused:
+        check_waypoints(machine, {}, [*poses[:2], (0.0, 0.0, 290.0, 0.0, 0.0, 0.0)], list("hlx"))
+    assert "q" in refused.value.what
+    assert "nothing has moved" in refused.value.remedy
+
+
+def test_the_controllers_own_parameters_decide_on_limits(site: Site) -> None:
+    pose = (0.0, 0.0, 252.0, 0.0, 0.0, 0.0)
+    path = [site.machine.home, pose]
+    least = check_waypoints(site.machine, {}, path, ["home", "high"])
+    assert 0.0 < least < 5.0
+    longer = {f"leg{i}.B_z": -10.0 for i in range(1, 7)}
+    with pytest.raises(GateRefused, match="q1"):
+        check_waypoints(site.machine, longer, path, ["home", "high"])
+    assert np.isfinite(least)

@@ -1,0 +1,54 @@
+"""Site files: what is wrong is named with its line and a remedy; a good one goes round."""
+
+from pathlib import Path
+
+import pytest
+from session_mock import site_text
+
+from app.site import parse_site
+from calib.errors import BadInput
+
+
+def test_a_good_site_goes_round(tmp_path: Path) -> None:
+    site = parse_site(site_text(), "site.toml", tmp_path)
+    again = parse_site(site.to_toml(), "again", tmp_path)
+    assert again.platform_nests == site.platform_nests
+    assert again.tracker == site.tracker
+    assert again.limits == site.limits
+    assert site.machine.name == "hexapod"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "what"),
+    [
+        ("pkm-site/1", "pkm-site/9", 1, "format"),
+        ('"hexapod"', '"hexapot"', None, "unknown machine"),
+        ('channel = "socket://127.0.0.1:9"\n', "", 4, "channel"),
+        ('"emscon"', '"leica"', 9, "emscon"),
+        ("127.0.0.1:9\"\nframe", "127.0.0.1:port\"\nframe", 10, "host:port"),
+        ("0.0, 0.0, 0.3]", "0.0, 0.3]", 11, "6 finite numbers"),
+        ("[260.0, 0.0, -30.0]", "[260.0, nan, -30.0]", 19, "3 finite numbers"),
+        ('kind = "operator"', 'kind = "operator"\nsmr = 1', 26, "smr"),
+        ("smrs = 1", "smrs = 0", 26, "smrs"),
+        ("b1 =", '"3" =', 19, "both"),
+        ("smrs = 1", 'smrs = 1\n\n[limits]\ndwell = 3.0', 29, "dwell"),
+        ("smrs = 1", 'smrs = 1\n\n[clock]\nscale = 0', 29, "greater than 0"),
+        ("smrs = 1", "smrs = = 1", 26, "TOML"),
+    ],
+)  # fmt: skip
+def test_a_fault_is_named_with_its_line(
+    tmp_path: Path, old: str, new: str, line: int | None, what: str
+) -> None:
+    text = site_text()
+    assert old in text
+    with pytest.raises(BadInput) as wrong:
+        parse_site(text.replace(old, new, 1), "site.toml", tmp_path)
+    assert what in str(wrong.value)
+    if line is not None:
+        assert wrong.value.place.endswith(f"line {line}")
+
+
+def test_a_lab_with_two_base_nests_is_told_why_that_is_too_few(tmp_path: Path) -> None:
+    text = site_text().replace("b3 = [-260.0, 0.0, -30.0]\nb4 = [0.0, -260.0, -30.0]\n", "")
+    with pytest.raises(BadInput, match="three tie tracker and base"):
+        parse_site(text, "site.toml", tmp_path)

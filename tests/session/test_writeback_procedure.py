@@ -1,0 +1,222 @@
+"""Write-back through the wires: kept when all is well, put back when anything is not."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from session_mock import POSES, Heard, Mock
+
+from app.errors import GateRefused
+from app.fit_file import Estimate, SavedFit, read_fit
+from app.model_files import write_model
+from app.run_files import read_run
+from app.session import PlanOptions, Session, measure_plan
+from app.session import events as ev
+from app.session.known import compare_with_known, read_held
+from app.session.station import Station
+from app.writeback.gates import Gates
+from app.writeback.procedure import WriteBack, accept, undo
+from app.writeback.transfer import snapshots_of
+from calib.identify import fit
+from calib.model import Model
+from calib.poses import verification_poses
+from calib.runs.stack import stack
+from drivers.errors import DeviceError, ParameterError
+
+# Three check poses are enough here.
+CHECK = {label: POSES[label] for label in "bdf"}
+
+
+async def measured_fit(mock: Mock, folder: Path) -> SavedFit:
+    """Measure 18 poses of the grid and fit them."""
+    grid = verification_poses(mock.site.machine).by_label
+    poses = {label: grid[label] for label in list(grid)[::12]}
+    options = PlanOptions(order="pose-by-pose", warm_up=False, two_face=False)
+    session = Session.create(
+        mock.site, measure_plan(mock.site, poses, options), folder, unattended=True
+    )
+    try:
+        outcome = await session.run()
+    finally:
+        await session.close()
+    loaded = read_run(outcome.run_folder)
+    path = folder / "model.toml"
+    write_model(path, fit(Model(stack(loaded.machine, [loaded.run]), [])))
+    return read_fit(path)
+
+
+async def yes(*_: object) -> bool:
+    return True
+
+
+def job(station: Station, found: SavedFit, folder: Path) -> WriteBack:
+    return WriteBack(
+        station, found, Gates.with_limits({}), folder, yes, unattended=True, poses=CHECK
+    )
+
+
+async def test_apply_corrects_the_machine_and_undo_brings_the_old_set_back(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3", "--seed", "7", scale=600)
+    found = await measured_fit(mock, tmp_path)
+    station = Station(mock.site)
+    station.observers.watch(heard)
+    await station.connect()
+    try:
+        old = await read_held(station.site, station.controller)
+        applied = await job(station, found, tmp_path).run()
+        assert applied.after.position_peak_um < 0.2 * applied.before.position_peak_um
+        await station.controller.reload_parameters()  # what survives a power cycle
+        now = await compare_with_known(station.site, station.controller)
+        assert now.values["leg1.B_x"] == found.estimates["leg1.B_x"].value
+        await undo(station, applied.snapshot, "undo")
+        back = await compare_with_known(station.site, station.controller)
+        assert back == old
+        assert [s.why for s in snapshots_of(station).all()][-1] == "before undo"
+    finally:
+        await station.close()
+    assert not [gate for gate in heard.of(ev.GateChecked) if not gate.passed]
+
+
+def small_change(station: Station, by: float = 0.02) -> SavedFit:
+    """A fit that passes every gate before writing: nominal, but for one leg's length."""
+    estimates = {
+        p.name: Estimate(p.name, p.nominal + (by if p.name == "leg1.L0" else 0.0), 1e-3, "mm", True)
+        for p in station.site.machine.parameters
+    }
+    quality = {"chi2_per_dof": 1.0, "holdout_rms_um": 9.0, "holdout_floor_um": 9.0}
+    covariance = 1e-6 * np.eye(len(estimates))
+    return SavedFit("made.toml", "hexapod", (), estimates, quality, covariance, False)
+
+
+async def test_a_value_that_reads_back_differently_restores_the_snapshot(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3", scale=600)
+    station = Station(mock.site)
+    station.observers.watch(heard)
+
+    def corrupt(event: ev.Event) -> None:
+        if isinstance(event, ev.WriteBackStage) and event.stage == "write":
+            mock.hands("fault", name="parameter-corrupt:leg1.L0")
+        if isinstance(event, ev.WriteBackStage) and event.stage == "restore":
+            mock.hands("clear")
+
+    station.observers.watch(corrupt)
+    await station.connect()
+    try:
+        with pytest.raises(ParameterError, match=r"leg1\.L0"):
+            await job(station, small_change(station), tmp_path).run()
+        held = await compare_with_known(station.site, station.controller)
+    finally:
+        await station.close()
+    assert held.values["leg1.L0"] == 230.715
+    assert heard.of(ev.WriteBackStage)[-1].stage == "restored"
+
+
+async def test_a_refused_store_restores_the_snapshot(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3", scale=600)
+    station = Station(mock.site)
+    station.observers.watch(heard)
+    mock.hands("fault", name="store-refused")
+
+    def allow(event: ev.Event) -> None:
+        if isinstance(event, ev.WriteBackStage) and event.stage == "restore":
+            mock.hands("clear")
+
+    station.observers.watch(allow)
+    await station.connect()
+    found = small_change(station, by=-1e-3)
+    gates = Gates.with_limits({"gain": 100.0, "check-peak": 1e6, "check-rms": 1.5})
+    try:
+        with pytest.raises(DeviceError):
+            await WriteBack(station, found, gates, tmp_path, yes, True, CHECK).run()
+        held = await compare_with_known(station.site, station.controller)
+    finally:
+        await station.close()
+    assert held.values["leg1.L0"] == 230.715
+
+
+async def test_a_restore_that_fails_latches_and_blocks_motion_until_undone(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3", scale=600)
+    station = Station(mock.site)
+    station.observers.watch(heard)
+
+    def corrupt(event: ev.Event) -> None:
+        if isinstance(event, ev.WriteBackStage) and event.stage == "write":
+            mock.hands("fault", name="parameter-corrupt:leg1.L0")
+
+    leave = station.observers.watch(corrupt)
+    await station.connect()
+    try:
+        with pytest.raises(ParameterError, match="parameters are unknown"):
+            await job(station, small_change(station), tmp_path).run()
+        leave()
+        mock.hands("clear")
+        with pytest.raises(ParameterError, match="undo"):
+            await compare_with_known(station.site, station.controller)
+        first = snapshots_of(station).get(1)
+        await undo(station, first, "undo to 1")
+        assert (await compare_with_known(station.site, station.controller)).values == first.values
+    finally:
+        await station.close()
+
+
+async def test_check_poses_that_are_worse_put_everything_back(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3", scale=600)
+    station = Station(mock.site)
+    await station.connect()
+    try:
+        with pytest.raises(GateRefused, match="check-peak"):
+            await job(station, small_change(station, by=0.5), tmp_path).run()
+        held = await compare_with_known(station.site, station.controller)
+    finally:
+        await station.close()
+    assert held.values["leg1.L0"] == 230.715
+
+
+async def test_a_no_from_the_operator_puts_everything_back(
+    mock_of: Callable[..., Mock], tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3", scale=600)
+    station = Station(mock.site)
+
+    async def no(*_: object) -> bool:
+        return False
+
+    gates = Gates.with_limits({"check-peak": 1e6, "check-rms": 10.0})
+    await station.connect()
+    try:
+        found = small_change(station)
+        with pytest.raises(GateRefused, match="not confirm"):
+            await WriteBack(station, found, gates, tmp_path, no, True, CHECK).run()
+        held = await compare_with_known(station.site, station.controller)
+    finally:
+        await station.close()
+    assert held.values["leg1.L0"] == 230.715
+
+
+async def test_what_the_controller_holds_can_be_accepted_knowingly(
+    mock_of: Callable[..., Mock], tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3", scale=600)
+    station = Station(mock.site)
+    await station.connect()
+    try:
+        await station.controller.disable()
+        await station.controller.write_parameters({"leg2.B_x": -46.5})
+        with pytest.raises(ParameterError, match=r"leg2\.B_x"):
+            await compare_with_known(station.site, station.controller)
+        await accept(station)
+        held = await compare_with_known(station.site, station.controller)
+    finally:
+        await station.close()
+    assert held.values["leg2.B_x"] == -46.5
