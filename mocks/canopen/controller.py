@@ -203,11 +203,12 @@ class Controller(StationNode):
         return self._kinematics.targets(pose, self.parameters.active)
 
     def _outside(self, targets: Sequence[float]) -> int:
-        """Bits of the actuators whose target is outside the controller's limits."""
+        """Bits of the actuators whose target is outside the controller's or its drive's limits."""
         return sum(
             1 << n
             for n, q in enumerate(targets)
             if not self.value(0x2420, n + 1) <= q <= self.value(0x2421, n + 1)
+            or not self.drives[n].allows(q - self._reference(n))
         )
 
     def _start(self, targets: list[float]) -> Result:

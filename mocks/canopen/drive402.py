@@ -81,6 +81,11 @@ class Drive(StationNode):
         window = self.value(0x6067) / COUNTS_PER_MM
         return not self.leg.moving and abs(self.leg.position() - self.leg.target) <= window
 
+    def allows(self, extension: float) -> bool:
+        """Whether an extension (mm) is within the software limits 0x607D."""
+        counts = extension * COUNTS_PER_MM
+        return bool(self.value(0x607D, 1) <= counts <= self.value(0x607D, 2))
+
     def follow(self, extension: float, duration_s: float) -> None:
         """Cyclic position: be at ``extension`` (mm) in ``duration_s`` of machine time."""
         self.limited = False

@@ -153,6 +153,25 @@ async def test_quick_stop_in_the_middle_of_everything(station, enabled):
     await working[1]
 
 
+async def test_jammed_leg_ends_a_jog(station, enabled):
+    await go(enabled, LOW)
+    station.hands("stall", leg=2)
+    with pytest.raises(DriveFault, match=r"q2 .*0x8611"):
+        await enabled.jog("q2", 240.0)
+
+
+async def test_stop_ends_a_jog(station, enabled):
+    await go(enabled, LOW)
+    drive = enabled._bus.controller.link._network[5]
+    await asyncio.to_thread(drive.sdo.download, 0x6081, 0, (250_000).to_bytes(4, "little"))
+    jogging = asyncio.ensure_future(enabled.jog("q5", 240.0))
+    await until(lambda: station.moving)
+    await enabled.stop()
+    with pytest.raises(Refused, match="stopped"):
+        await jogging
+    assert not station.moving
+
+
 async def test_nobody_at_the_address():
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
@@ -172,7 +191,7 @@ async def test_drive_that_is_switched_off(station):
 
 
 async def test_another_serial_number(station):
-    with pytest.raises(Refused, match="serial number 1001, expected 77"):
+    with pytest.raises(Refused, match=r"serial number \d+, expected 77"):
         await CanopenController.connect("slcan", station.channel, serial="77")
 
 
