@@ -24,6 +24,7 @@ Names, with what reads them:
 ``tracker-no-result``                   StartMeasurement is answered, the result never comes
 ``tracker-result-unstable``             the result comes with status NoStationaryResult
 ``tracker-unsolicited-error``           one-shot: an Error packet with command Unknown
+``jammed``                              set by the machine itself: the legs could not close
 ``misplace:NEST``                       one-shot: the next SMR carried ends in NEST instead
 ======================================  ==========================================================
 """

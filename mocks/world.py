@@ -98,10 +98,18 @@ class World:
         self._jump.set(self.clock.now(), self._jump.last + np.asarray(move, dtype=float))
 
     def pose(self, times: Array) -> Pose:
-        """True poses of the platform in the base frame at ``times`` (N,)."""
+        """True poses of the platform in the base frame at ``times`` (N,).
+
+        Where the legs cannot close (opposite ends of their strokes) the platform jams: it stays
+        where it was last, and the fault ``jammed`` stands.
+        """
         circumstances = self._circumstances(times)
         start = self._start(times.size)
-        pose = solve_pose(self._geometry, self._errors, circumstances, self._home_twist, start)
+        try:
+            pose = solve_pose(self._geometry, self._errors, circumstances, self._home_twist, start)
+        except (ArithmeticError, np.linalg.LinAlgError):
+            self.faults.inject("jammed")
+            return start
         self._last = Pose(pose.position[-1:], pose.rotation[-1:])
         return pose
 

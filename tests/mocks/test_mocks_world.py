@@ -81,6 +81,17 @@ def test_machine_settles() -> None:
     assert off[-1] < 1e-5
 
 
+def test_machine_jams_where_its_legs_cannot_close() -> None:
+    w = world()
+    go(w, [5.0] * 6)
+    before = w.pose(np.array([w.clock.now()])).position
+    go(w, [34.2, -35.7, -35.7, 34.2, -35.7, -35.7])
+    assert w.pose(np.array([w.clock.now()])).position == pytest.approx(before)
+    assert "jammed" in w.faults
+    go(w, [0.0] * 6)
+    assert w.pose(np.array([w.clock.now()])).position != pytest.approx(before)
+
+
 def test_tracker_stands_where_the_examples_stood() -> None:
     for seed in range(20):
         w = world(seed=seed)
