@@ -98,10 +98,18 @@ def rotation_z(angle: float) -> Array:
 
 def rotation_from_rpy(rx: float, ry: float, rz: float) -> Array:
     """Rz(rz) Ry(ry) Rx(rx), (3, 3)."""
-    cx, sx, cy, sy = np.cos(rx), np.sin(rx), np.cos(ry), np.sin(ry)
-    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
-    about_y = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
-    return np.asarray(rotation_z(rz) @ about_y @ about_x)
+    return np.asarray(rotations_from_rpy(np.array([[rx, ry, rz]]))[0])
+
+
+def rotations_from_rpy(angles: Array) -> Array:
+    """Rz(rz) Ry(ry) Rx(rx) for angles (N, 3): (N, 3, 3)."""
+    (cx, cy, cz), (sx, sy, sz) = np.cos(angles.T), np.sin(angles.T)
+    rows = [
+        [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
+        [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
+        [-sy, cy * sx, cy * cx],
+    ]
+    return np.asarray(np.array(rows).transpose(2, 0, 1))
 
 
 def rpy_from_rotation(rotation: Array) -> Array:
@@ -148,10 +156,15 @@ def geometry(
     )  # fmt: skip
 
 
+def _dot(a: Array, b: Array) -> Array:
+    """Scalar products along the last axis."""
+    return np.asarray(np.einsum("...i,...i->...", a, b))
+
+
 def _across(vectors: Array, axis: Array) -> Array:
     """Unit vectors of ``vectors`` projected along the unit ``axis``."""
-    flat = vectors - np.sum(vectors * axis, axis=-1, keepdims=True) * axis
-    return np.asarray(flat / np.sqrt(np.sum(flat * flat, axis=-1, keepdims=True)))
+    flat = vectors - _dot(vectors, axis)[..., None] * axis
+    return np.asarray(flat / np.sqrt(_dot(flat, flat))[..., None])
 
 
 def legs(g: HexapodGeometry, pose: Pose, n_P: Array | None = None) -> Legs:
@@ -167,7 +180,7 @@ def legs(g: HexapodGeometry, pose: Pose, n_P: Array | None = None) -> Legs:
         end = joint + g.LP[:, None] * n_P
     assert n_P is not None
     v = end - start
-    length = np.sqrt(np.sum(v * v, axis=2))
+    length = np.sqrt(_dot(v, v))
     return Legs(
         length=length, u=v / length[:, :, None], arm=end - pose.position[:, None, :],
         second_base=np.cross(x_B, n_B), second_platform=np.cross(x_P, n_P), arm_axis=n_P,

@@ -17,6 +17,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=1, help="draws truth, room, noise, poses")
     parser.add_argument("--poses", default="60", help="a number, or a CSV file x,y,z,rx,ry,rz")
     parser.add_argument("--order", choices=["nest-by-nest", "pose-by-pose"], default="nest-by-nest")
+    parser.add_argument("--cycles", type=int, default=1, help="visits of all poses")
     parser.add_argument("--noise-um", type=float, help="per axis; without: a tracker's own")
     parser.add_argument("--hidden", type=Path, help="hidden effects (TOML or JSON)")
     parser.add_argument("--parameters", type=Path, help="true parameters (TOML or JSON)")
@@ -40,6 +41,7 @@ def plan_of(options: argparse.Namespace) -> RunPlan:
         seed=options.seed,
         poses=int(poses) if poses.isdigit() else read_poses(Path(poses)),
         order=options.order,
+        cycles=options.cycles,
         noise_mm=None if options.noise_um is None else 1e-3 * options.noise_um,
         hidden=Hidden() if options.hidden is None else Hidden.read(options.hidden),
         parameters=parameters,

@@ -40,16 +40,16 @@ def points_csv(run: SimulatedRun) -> str:
     sigma = np.sqrt(run.covariance[:, :3])
     header = ["time_s", "pose", "nest", *(f"q{i + 1}" for i in range(run.q.shape[1]))]
     header += ["x", "y", "z", "sx", "sy", "sz", *(["sxy", "sxz", "syz"] if mixed else [])]
-    header += list(run.channels)
+    header += [*(["cycle"] if run.plan.cycles > 1 else []), *run.channels]
     lines = [",".join(header)]
     channels = np.column_stack(list(run.channels.values())).tolist()
     places = [2 if name == "delay_s" else 3 for name in run.channels]
     rows = zip(
         run.layout.time.tolist(), run.layout.pose.tolist(), run.layout.labelled.tolist(),
         run.layout.nest, run.q.tolist(), run.xyz.tolist(), sigma.tolist(),
-        run.covariance[:, 3:].tolist(), channels, strict=True,
+        run.covariance[:, 3:].tolist(), channels, run.layout.cycle.tolist(), strict=True,
     )  # fmt: skip
-    for time, pose, labelled, nest, q, xyz, s, cov, values in rows:
+    for time, pose, labelled, nest, q, xyz, s, cov, values, cycle in rows:
         label = ("home" if pose < 0 else str(pose + 1)) if labelled else ""
         cells = [f"{time:.2f}", label, nest, *(f"{v:.6f}" for v in q)]
         if nest:
@@ -57,6 +57,8 @@ def points_csv(run: SimulatedRun) -> str:
             cells += [f"{v:.6e}" for v in cov] if mixed else []
         else:
             cells += [""] * (9 if mixed else 6)
+        if run.plan.cycles > 1:
+            cells.append(str(cycle) if cycle else "")
         cells += [f"{v:.{n}f}" for v, n in zip(values, places, strict=True)]
         lines.append(",".join(cells))
     return "\n".join(lines) + "\n"

@@ -13,7 +13,7 @@ from mocks.physics.hexapod import (
     geometry,
     home_pose,
     legs,
-    rotation_from_rpy,
+    rotations_from_rpy,
 )
 from mocks.physics.play import follow
 from mocks.physics.truth import nominal_parameters
@@ -27,8 +27,7 @@ DRAWN_AT_ONCE = 4
 
 def as_poses(poses: Array) -> Pose:
     """Poses from (N, 6): x, y, z in mm, rx, ry, rz in rad."""
-    rotation = np.array([rotation_from_rpy(*row[3:]) for row in poses]).reshape(-1, 3, 3)
-    return Pose(np.asarray(poses[:, :3], dtype=float), rotation)
+    return Pose(np.asarray(poses[:, :3], dtype=float), rotations_from_rpy(poses[:, 3:]))
 
 
 def controller_parameters(machine: Machine, given: Mapping[str, float]) -> dict[str, float]:

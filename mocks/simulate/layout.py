@@ -18,13 +18,15 @@ class Layout:
     """R rows in the order of the run.
 
     ``pose`` (R,) index of the commanded pose, -1 = home; ``nest`` names, "" for a move without a
-    reading; ``labelled`` (R,) whether the row carries its pose's label; ``time`` (R,) s.
+    reading; ``labelled`` (R,) whether the row carries its pose's label; ``time`` (R,) s;
+    ``cycle`` (R,) number of the visit, from 1 (0 where there is none).
     """
 
     pose: NDArray[np.intp]
     nest: tuple[str, ...]
     labelled: NDArray[np.bool_]
     time: Array
+    cycle: NDArray[np.intp]
 
     @property
     def reading(self) -> NDArray[np.bool_]:
@@ -35,23 +37,27 @@ class Layout:
 def arrange(plan: RunPlan, poses: int) -> Layout:
     """Rows of a campaign: home, base nests, poses and nests with base nests between, base nests."""
     if plan.order == "nest-by-nest":
-        visits = [(p, nest) for nest in plan.nests for p in range(poses)]
+        visits = [(p, n, c) for n in plan.nests for c in range(plan.cycles) for p in range(poses)]
     else:
-        visits = [(p, nest) for p in range(poses) for nest in plan.nests]
-    rows: list[tuple[int, str, bool, float]] = [(HOME, "", True, 0.0)]
+        visits = [(p, n, c) for c in range(plan.cycles) for p in range(poses) for n in plan.nests]
+    rows: list[tuple[int, str, bool, float, int]] = [(HOME, "", True, 0.0, 0)]
     time, before = FIRST_S - MOVE_S, HOME
 
     def base_nests(pose: int, at: float) -> None:
-        rows.extend((pose, nest, False, at) for nest in BASE_NESTS)
+        rows.extend((pose, nest, False, at, 0) for nest in BASE_NESTS)
 
-    for count, (pose, nest) in enumerate(visits):
+    for count, (pose, nest, cycle) in enumerate(visits):
         time += NEXT_NEST_S if pose == before else MOVE_S
         if count % plan.base_every == 0:
             base_nests(pose if count else HOME, time - BASE_BEFORE_S)
-        rows.append((pose, nest, True, time))
+        rows.append((pose, nest, True, time, cycle + 1))
         before = pose
     base_nests(before, time + NEXT_NEST_S)
-    pose_index, nests, labelled, times = zip(*rows, strict=True)
+    pose_index, nests, labelled, times, cycles = zip(*rows, strict=True)
     return Layout(
-        np.array(pose_index), tuple(nests), np.array(labelled), np.array(times, dtype=float)
+        pose=np.array(pose_index),
+        nest=tuple(nests),
+        labelled=np.array(labelled),
+        time=np.array(times, dtype=float),
+        cycle=np.array(cycles),
     )

@@ -39,6 +39,9 @@ class RunPlan:
         How many random reachable poses, or the poses: x, y, z in mm, rx, ry, rz in rad.
     order : {"nest-by-nest", "pose-by-pose"}
         One SMR that is carried after each pass, or three SMRs.
+    cycles : int
+        How often all poses are visited with each nest; with more than one the file has a column
+        ``cycle``.
     noise_mm : float or None
         Standard deviation per axis of every reading; None: radial and angular parts of a tracker,
         with covariances in the file.
@@ -58,6 +61,7 @@ class RunPlan:
     poses: int | Array = 60
     order: Order = "nest-by-nest"
     nests: tuple[str, ...] = ("3", "4", "5")
+    cycles: int = 1
     noise_mm: float | None = 0.005
     base_every: int = 45
     hidden: Hidden = field(default_factory=Hidden)

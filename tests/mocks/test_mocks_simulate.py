@@ -44,11 +44,19 @@ def test_other_order_dwells_at_all_nests_of_a_pose() -> None:
     ]  # fmt: skip
 
 
+def test_cycles_are_numbered_visits_of_the_same_poses() -> None:
+    made = simulate(RunPlan(seed=1, poses=4, cycles=3, order="pose-by-pose"))
+    rows = [r for r in rows_of(made) if r["pose"] not in ("", "home")]
+    assert [r["cycle"] for r in rows] == ["1"] * 12 + ["2"] * 12 + ["3"] * 12
+    assert rows[0]["q1"] == rows[12]["q1"] == rows[24]["q1"]
+    parse_run(run_toml(made), points_csv(made), actuators=6)
+
+
 @pytest.mark.parametrize("noise", [0.005, None])
 def test_files_are_read_by_the_reader_of_runs(noise: float | None) -> None:
     profile = Profile(payload_kg=(0.0, 5.0))
     held = {"leg1.L0": 230.8}
-    plan = RunPlan(2, 12, noise_mm=noise, delays=True, controller=held, profile=profile)
+    plan = RunPlan(seed=2, poses=12, noise_mm=noise, delays=True, controller=held, profile=profile)
     made = simulate(plan)
     run = parse_run(run_toml(made), points_csv(made), actuators=6)
     assert run.header.controller_parameters["leg1.L0"] == 230.8
