@@ -45,6 +45,8 @@ class Memory:
     q: tuple[float, ...] = ()
     arrived_s: float = 0.0
     settled: bool = False
+    channels: tuple[float, dict[str, float]] = field(default_factory=lambda: (0.0, {}))
+    """When the channels were last asked for (machine s), and the answer."""
     controller_parameters: dict[str, float] = field(default_factory=dict)
 
 

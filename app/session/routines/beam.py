@@ -14,6 +14,8 @@ from drivers.errors import BeamBroken, DeviceError, MeasurementError, NoTarget, 
 from drivers.interface import TrackerReading, TrackSample
 
 _SAMPLE_S = 0.05
+_SAMPLES_PER_WALL_S = 2500.0
+"""A fast clock must not flood the wire."""
 _RELOCK_TRIES = 4
 _RELOCK_WAIT_S = 0.5
 """Wall seconds between tries to find the reflector again."""
@@ -42,10 +44,11 @@ async def settle(work: Work) -> None:
     if work.memory.settled:
         return
     limits = work.limits
-    count = max(round(limits.settle_window_s / _SAMPLE_S), 6)
+    separation = max(_SAMPLE_S, work.clock.scale / _SAMPLES_PER_WALL_S)
+    count = max(round(limits.settle_window_s / separation), 6)
     window: deque[tuple[float, float, float]] = deque(maxlen=count)
     first: float | None = None
-    async with _closing(work.tracker.stream(_SAMPLE_S)) as samples:
+    async with _closing(work.tracker.stream(separation)) as samples:
         async for sample in samples:
             first = sample.time_s if first is None else first
             if not sample.valid:

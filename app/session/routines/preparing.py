@@ -12,6 +12,7 @@ from drivers.errors import DeviceFault, NotReady, Refused
 
 _LOOK_S = 10.0
 """Machine seconds between two looks at the channels while warming up."""
+_CHANNELS_AGE_S = 8.0
 _PATIENCE = 30.0
 """How many times the warm-up span the machine may take to become steady."""
 
@@ -137,9 +138,17 @@ def _slope(seen: list[tuple[float, dict[str, float]]]) -> float:
 
 
 async def channels(work: Work) -> dict[str, float]:
-    """Everything that controller and tracker say about the state of things."""
-    tracker_says = await work.tracker.channels()
-    return {**tracker_says, **await work.controller.channels()}
+    """Everything that controller and tracker say about the state of things.
+
+    Asked anew when the last answer is older than a few machine seconds: the nests of one pose
+    share it, temperatures are slower.
+    """
+    asked, known = work.memory.channels
+    if not known or work.clock.now() - asked > _CHANNELS_AGE_S:
+        tracker_says = await work.tracker.channels()
+        known = {**tracker_says, **await work.controller.channels()}
+        work.memory.channels = (work.clock.now(), known)
+    return dict(known)
 
 
 async def rest(work: Work, step: Step) -> Done:
