@@ -1,0 +1,172 @@
+"""Describe a machine, check what its file says, draw it"""
+
+import shutil
+from pathlib import Path
+
+import click
+import numpy as np
+
+from app import answer
+from app.analysis_options import chosen_machine, machine_options
+from app.machine_drawing import draw_figure, draw_text
+from app.machine_files import load_machine
+from app.machine_templates import TEMPLATES
+from app.machine_words import inspection_data, inspection_words
+from calib.analysis.inspection import inspect
+from calib.analysis.skeleton import skeleton
+from calib.errors import BadInput
+from calib.mechanism.description import Machine
+from calib.mechanism.solve import Configuration, home_configuration, inverse
+from calib.mechanism.task import task_values
+from calib.poses.verification import verification_poses
+from calib.quantity import quantity
+
+
+@click.group()
+def command() -> None:
+    """Describe a machine in a file, check it, and look at it."""
+
+
+@command.command()
+@machine_options
+@click.option("--seed", default=1, show_default=True, help="Seed of the poses that are tried.")
+@answer.json_option
+def check(machine_name: str, closure: str, seed: int, as_json: bool) -> None:
+    """Say in words what a machine file describes, or what is wrong with it.
+
+    Closure at home, mobility, constraints and redundancy, rank, limits and what of the workspace
+    they keep out of reach. A file that cannot work ends with exit code 2, the line and a remedy.
+    """
+    machine = chosen_machine(machine_name, closure)
+    found = inspect(machine, np.random.default_rng(seed))
+    grid = verification_poses(machine)
+    answer.show(inspection_data(found, grid), as_json, inspection_words(found, grid))
+
+
+@command.command()
+@machine_options
+@click.option("--at", "pose", default="", help='A pose: "x=10 rz=5deg"; home if not given.')
+@click.option("--out", type=click.Path(path_type=Path), help="Write a figure (png, svg, pdf).")
+def draw(machine_name: str, closure: str, pose: str, out: Path | None) -> None:
+    """Draw limbs and joints: into a figure, or from two sides in the terminal."""
+    machine = chosen_machine(machine_name, closure)
+    configuration = _configuration(machine, pose)
+    shape = skeleton(machine, configuration)
+    if out:
+        draw_figure(shape, f"{machine.name}: {machine.says}", out)
+        answer.say(f"written to {out}")
+        return
+    size = shutil.get_terminal_size((80, 24))
+    click.echo(draw_text(shape, min(size.columns, 160), max(10, min(size.lines - 4, 40))))
+    x, y, z, *angles = np.round(configuration.poses.to_xyz_rpy()[:, 0], 6) + 0.0
+    turned = ", ".join(f"{np.rad2deg(a):.2f}" for a in angles)
+    click.echo(f"platform at {x:.2f}, {y:.2f}, {z:.2f} mm; rx, ry, rz {turned} deg")
+
+
+def _configuration(machine: Machine, pose: str) -> Configuration:
+    home = home_configuration(machine)
+    if not pose:
+        return home
+    values = task_values(machine.task, home.poses)[:, 0]
+    for item in pose.replace(",", " ").split():
+        name, equals, text = item.partition("=")
+        if name not in machine.task.coordinates or not equals:
+            raise BadInput(
+                f'"{item}" in --at',
+                remedy=f'Write "{machine.task.coordinates[0]}=10"; this machine commands '
+                f"{', '.join(machine.task.coordinates)}.",
+            )
+        unit = "mm" if name in "xyz" else "rad"
+        values[machine.task.coordinates.index(name)] = quantity(text, unit, "--at")
+    found = inverse(machine, values[:, None])
+    if not found.converged[0]:
+        raise BadInput("the machine does not close at this pose", remedy="Choose a pose in reach.")
+    return found
+
+
+class Asked:
+    """Answers given by ``--set``, else those of the person, else the defaults."""
+
+    def __init__(self, given: dict[str, str], quiet: bool) -> None:
+        self.given, self.quiet, self.known = given, quiet, list[str]()
+
+    def number(self, name: str, question: str, default: float) -> float:
+        """Ask for a number."""
+        text = self.text(
+            name, question, f"{default:g}" if default == round(default, 3) else f"{default!r}"
+        )
+        return quantity(float(text) if _is_number(text) else text, "", f"{name} = {text}")
+
+    def text(self, name: str, question: str, default: str) -> str:
+        """Ask for a text."""
+        self.known.append(name)
+        if name in self.given:
+            return self.given[name]
+        if self.quiet:
+            return default
+        answered: str = click.prompt(f"{question}", default=default, err=True)
+        return answered
+
+    def check(self) -> None:
+        """Refuse values that nobody asked for."""
+        for name in self.given:
+            if name not in self.known:
+                raise BadInput(
+                    f'--set {name}: nobody asked for "{name}"',
+                    remedy=f"Asked were {', '.join(self.known)}.",
+                )
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+@command.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--kind", type=click.Choice([t.name for t in TEMPLATES]), help="Kind of machine.")
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Answer beforehand.")
+@click.option("--yes", is_flag=True, help="Take the defaults for everything else.")
+@click.option("--force", is_flag=True, help="Overwrite the file.")
+def new(file: Path, kind: str | None, settings: tuple[str, ...], yes: bool, force: bool) -> None:
+    """Ask a few questions and write a commented machine file.
+
+    The file is a beginning: put your own joint centres, limits and tolerances into it. What is
+    written is checked at once.
+    """
+    if file.exists() and not force:
+        raise BadInput("there is such a file already", place=str(file), remedy="Add --force.")
+    given = dict(_setting(s) for s in settings)
+    if kind is None:
+        for template in TEMPLATES:
+            answer.say(f"  {template.name:8} {template.says}")
+        names = click.Choice([t.name for t in TEMPLATES])
+        kind = "own" if yes else click.prompt("kind of machine", type=names, err=True)
+    template = next(t for t in TEMPLATES if t.name == kind)
+    asked = Asked(given, yes)
+    text = template.render(file.stem, asked)
+    asked.check()
+    file.write_text(text, encoding="utf-8")
+    answer.say(f"written to {file}")
+    try:
+        machine = load_machine(str(file))
+    except BadInput as wrong:
+        # The file is the person's to finish: its first fault is the next thing to do.
+        click.echo(f"It does not work yet: {wrong}")
+        return
+    found = inspect(machine, np.random.default_rng(1))
+    click.echo(
+        f"It closes. Limbs: {len(machine.limbs)}, actuators: {len(machine.actuators)}, "
+        f"parameters: {len(machine.parameters)}; {100 * found.reach:.0f} % of its workspace box is "
+        f"within reach.\nNext: pkmcal machine draw {file}; pkmcal machine check {file}"
+    )
+
+
+def _setting(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise BadInput(f'--set "{text}"', remedy="Write --set NAME=VALUE.")
+    return name, value
