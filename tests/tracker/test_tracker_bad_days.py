@@ -32,8 +32,10 @@ async def test_beam_comes_back_by_itself_and_the_next_dwell_is_good(locked: Benc
     locked.server.instrument.measuring.break_next = (0.5, 1.0)
     with pytest.raises(BeamBroken):
         await locked.tracker.measure(4.0)
-    await asyncio.sleep(3.0 / SCALE)
-    assert (await locked.tracker.state()).locked
+    for _ in range(400):
+        if (await locked.tracker.state()).locked:
+            break
+        await asyncio.sleep(0.005)
     reading = await locked.tracker.measure(1.0)
     assert np.linalg.norm(np.array(reading.xyz) - locked.nest("3")) < 0.05
 
@@ -93,7 +95,7 @@ async def test_unsolicited_error_is_no_answer_to_a_command(locked: Bench) -> Non
 
 
 async def test_unsolicited_error_in_a_dwell_is_loss_of_lock(locked: Bench) -> None:
-    dwell = asyncio.create_task(locked.tracker.measure(10.0))
+    dwell = asyncio.create_task(locked.tracker.measure(100.0))
     await asyncio.sleep(2.0 / SCALE)
     locked.server.instrument.unsolicited(12345)
     with pytest.raises(BeamBroken, match="not published"):
@@ -102,7 +104,7 @@ async def test_unsolicited_error_in_a_dwell_is_loss_of_lock(locked: Bench) -> No
 
 
 async def test_smr_carried_away_in_a_dwell(locked: Bench) -> None:
-    dwell = asyncio.create_task(locked.tracker.measure(10.0))
+    dwell = asyncio.create_task(locked.tracker.measure(100.0))
     await asyncio.sleep(2.0 / SCALE)
     locked.server.instrument.drop_smr()
     with pytest.raises(BeamBroken):
@@ -110,7 +112,7 @@ async def test_smr_carried_away_in_a_dwell(locked: Bench) -> None:
 
 
 async def test_platform_moving_in_a_dwell_is_no_stationary_result(locked: Bench) -> None:
-    dwell = asyncio.create_task(locked.tracker.measure(4.0))
+    dwell = asyncio.create_task(locked.tracker.measure(40.0))
     await asyncio.sleep(0.005)
     locked.world.legs[0].command(8.0, 1.0)
     with pytest.raises(MeasurementError, match="did not stand still"):
@@ -123,13 +125,13 @@ async def test_stop_ends_a_dwell_at_once(locked: Bench) -> None:
     await locked.tracker.stop()
     await locked.tracker.stop()
     with pytest.raises(BeamBroken, match="stopped"):
-        await asyncio.wait_for(dwell, 0.3)
+        await asyncio.wait_for(dwell, 0.4)
     await locked.tracker.measure(0.5)
 
 
 async def test_cancelled_dwell_leaves_no_result_behind(locked: Bench) -> None:
-    dwell = asyncio.create_task(locked.tracker.measure(2.0))
-    await asyncio.sleep(0.5 / SCALE)
+    dwell = asyncio.create_task(locked.tracker.measure(100.0))
+    await asyncio.sleep(0.005)
     dwell.cancel()
     with pytest.raises(asyncio.CancelledError):
         await dwell
@@ -141,7 +143,7 @@ async def test_cancelled_dwell_leaves_no_result_behind(locked: Bench) -> None:
 async def test_cancelled_command_does_not_answer_the_next_one(locked: Bench) -> None:
     x, y, z = locked.nest("3")
     nowhere = asyncio.create_task(locked.tracker.point_at((x, y, z + 200.0)))
-    await asyncio.sleep(0.001)
+    await asyncio.sleep(0)  # the request is on its way
     nowhere.cancel()
     with pytest.raises(asyncio.CancelledError):
         await nowhere
@@ -153,12 +155,13 @@ async def test_cancelled_command_does_not_answer_the_next_one(locked: Bench) -> 
 async def test_stop_while_the_beam_turns_does_not_wait_for_it(locked: Bench) -> None:
     turning = asyncio.create_task(locked.tracker.point_at(locked.nest("b3")))
     await asyncio.sleep(0)
-    await asyncio.wait_for(locked.tracker.stop(), 0.001)
+    await locked.tracker.stop()
+    assert not turning.done()
     await turning
 
 
 async def test_link_reset_in_a_dwell(locked: Bench) -> None:
-    dwell = asyncio.create_task(locked.tracker.measure(20.0))
+    dwell = asyncio.create_task(locked.tracker.measure(100.0))
     await asyncio.sleep(0.02)
     locked.server.reset_connection()
     with pytest.raises(LinkLost, match="reconnect"):

@@ -58,7 +58,7 @@ async def test_a_reading_costs_its_dwell_and_little_more(locked: Bench) -> None:
         start = time.perf_counter()
         await locked.tracker.measure(3.0)
         costs.append(time.perf_counter() - start)
-    assert np.median(costs) < 3.0 / SCALE + 0.010
+    assert np.median(costs) < 3.0 / SCALE + 0.025
 
 
 async def test_every_nest_can_be_aimed_at(locked: Bench) -> None:
