@@ -125,6 +125,7 @@ class CanLink:
         try:
             await asyncio.wait_for(connecting, timeout)
         except TimeoutError as error:
+            link.closed = True
             what = f"did not open within {timeout} s"
             raise ConnectFailed(what, device=link.name, remedy=remedy) from error
         except (can.CanError, OSError, ValueError) as error:
@@ -135,11 +136,19 @@ class CanLink:
 
     def _open_bus(self) -> None:
         self._network.connect(**self.address.options())
-        # slcan on TCP: frames are short and must not wait for one another's acknowledgement.
+        if self.closed:  # too late: nobody waits any more
+            self._disconnect()
+            return
+        connection = self._connection()
+        if connection is not None:
+            # Frames are short and must not wait for one another's acknowledgement.
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def _connection(self) -> socket.socket | None:
+        """The socket of an adapter on TCP, which python-can and pyserial keep to themselves."""
         port = getattr(self._network.bus, "serialPortOrig", None)
         connection = getattr(port, "_socket", None)
-        if isinstance(connection, socket.socket):
-            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return connection if isinstance(connection, socket.socket) else None
 
     def add_device(self, node_id: int, eds: Path, label: str) -> "Device":
         """Add a remote node; ``label`` is what errors call it."""
@@ -329,4 +338,10 @@ class CanLink:
     def _disconnect(self) -> None:
         if self._watcher.is_alive():
             self._watcher.join(1.0)
-        self._network.disconnect()
+        connection = self._connection()
+        try:
+            self._network.disconnect()
+        finally:
+            # On a broken line neither slcan's shutdown nor pyserial's close gets as far as this.
+            if connection is not None:
+                connection.close()

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import struct
 import subprocess
 import sys
 import time
@@ -99,6 +100,17 @@ async def connected(station: Station) -> AsyncIterator[Connected]:
 @pytest.fixture
 def controller(connected: Connected) -> CanopenController:
     return connected.controller
+
+
+@pytest.fixture
+async def slow(enabled: CanopenController) -> CanopenController:
+    """An enabled controller at z = 206, whose moves from there take some wall seconds."""
+    controller = enabled
+    await controller.move_to_pose((0.0, 0.0, 206.0, 0.0, 0.0, 0.0))
+    await controller.wait_arrived(5.0)
+    device = controller._bus.controller
+    await device.call(lambda: device.download(0x2430, 0, struct.pack("<d", 0.25)))  # mm/s
+    return controller
 
 
 @pytest.fixture

@@ -4,14 +4,12 @@ import asyncio
 import contextlib
 import socket
 import threading
-import time
 from collections.abc import Callable, Iterator
 
 import pytest
 
 from drivers.canopen import CanopenController
 from drivers.errors import HeartbeatLost
-from drivers.interface import Alarm
 
 HOME = (0.0, 0.0, 220.0, 0.0, 0.0, 0.0)
 
@@ -74,12 +72,10 @@ async def test_lost_frame_costs_time_and_nothing_else(middleman: Middleman, lost
 async def test_silent_adapter_is_noticed_by_the_heartbeats(station, middleman: Middleman):
     controller = await CanopenController.connect("slcan", middleman.channel, silence_s=0.6)
     await controller.enable()
-    begin = time.monotonic()
+    noticed = asyncio.Event()
+    controller.on_alarm(lambda alarm: noticed.set())
     middleman.loses = lambda line: True
-    alarms: list[Alarm] = []
-    controller.on_alarm(alarms.append)
-    while not alarms and time.monotonic() - begin < 3.0:
-        await asyncio.sleep(0.02)
+    await asyncio.wait_for(noticed.wait(), 3.0)
     with pytest.raises(HeartbeatLost):
         controller.check()
     await controller.close()

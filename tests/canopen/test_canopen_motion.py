@@ -161,22 +161,19 @@ async def test_lost_reference_needs_homing(station, enabled: CanopenController):
     await go(enabled, HOME)
 
 
-async def test_stop_during_a_move_brakes_and_takes_the_power_off(
-    station, enabled: CanopenController
-):
-    await go(enabled, (0.0, 0.0, 210.0, 0.0, 0.0, 0.0))
-    await enabled.move_to_pose((0.0, 0.0, 240.0, 0.0, 0.0, 0.0))
-    await enabled.stop()
+async def test_stop_during_a_move_brakes_and_takes_the_power_off(station, slow: CanopenController):
+    targets = await slow.move_to_pose((0.0, 0.0, 240.0, 0.0, 0.0, 0.0))
+    await slow.stop()
     assert not station.moving
     with pytest.raises(DeviceFault, match="stopped before"):
-        await enabled.wait_arrived(2.0)
-    await enabled.stop()
+        await slow.wait_arrived(2.0)
+    await slow.stop()
     await asyncio.sleep(0.1)
-    state = await enabled.state()
+    state = await slow.state()
     assert {a.state for a in state.actuators} == {"switch on disabled"}
-    assert all(abs(a.position - 240.0) > 1.0 for a in state.actuators)
-    await enabled.enable()
-    await go(enabled, HOME)
+    assert all(abs(a.position - q) > 1.0 for a, q in zip(state.actuators, targets, strict=True))
+    await slow.enable()
+    await go(slow, HOME)
 
 
 async def test_stop_overtakes_a_long_transfer(controller: CanopenController):
