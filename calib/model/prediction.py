@@ -326,10 +326,15 @@ class Model:
         )
 
     def deviation(self, state: State) -> Array:
-        """Distance (p,) of every unknown from the mean of its prior, in its own unit."""
+        """Distance (p,) of every unknown from the mean of its prior, in its own unit.
+
+        Nonlinear unknowns have been searched for: their priors hold them where they were found.
+        """
         own = np.concatenate([state.parameters[self.free], *state.effects])
         deviation = np.zeros(self.prior.size)
         deviation[: own.size] = own - self.centre[: own.size]
+        scanned = [unknown.nonlinear for group in self.unknowns for unknown in group]
+        deviation[self.free.size : own.size][scanned] = 0.0
         return deviation
 
 
