@@ -36,7 +36,6 @@ from mocks.tracker.server import TrackerServer
 from mocks.world import World, WorldPlan
 
 CONTROLLER_NODE = 10
-FIRST_SERIAL = 1000
 FRAME_ERROR_MM, FRAME_ERROR_RAD = 3.0, 0.003
 
 
@@ -53,7 +52,7 @@ class MockStation:
     ) -> None:
         self.world = world
         self.clock = clock
-        self.serial = serial if serial is not None else _serial(world.plan.seed, nvm)
+        self.serial = serial if serial is not None else _serial(nvm)
         host = "127.0.0.1"
         self.can = CanopenStation(world, nvm, host, ports[0], self.serial)
         self.tracker = TrackerServer(world, clock, host, ports[1])
@@ -129,13 +128,19 @@ class MockStation:
         return [round(f + w * float(rng.normal()), 4) for f, w in zip(exact, wrong, strict=True)]
 
 
-def _serial(seed: int, nvm: Path | None) -> int:
-    """Serial number of the controller.
+def _serial(nvm: Path | None) -> int:
+    """Serial number of the controller: as lasting as its memory.
 
-    One whose memory ends with its process is another controller each time: a program that
-    remembers what it wrote to a controller must not expect it there.
+    A program that remembers what it wrote to a controller must not expect it in another one, so a
+    new memory is a new controller. The number stands in a file beside the memory's.
     """
-    return FIRST_SERIAL + seed if nvm is not None else int(time.time() * 10.0) % 10**8
+    fresh = int(time.time() * 10.0) % 10**8
+    if nvm is None:
+        return fresh
+    label = nvm.with_name(nvm.name + ".serial")
+    if not label.exists():
+        label.write_text(str(fresh), encoding="ascii")
+    return int(label.read_text(encoding="ascii"))
 
 
 def _arguments(argv: list[str] | None) -> argparse.Namespace:
@@ -151,7 +156,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--truth", type=Path, help="true parameters (TOML or JSON)")
     parser.add_argument("--hidden", type=Path, help="hidden effects (TOML or JSON)")
     parser.add_argument("--nvm", type=Path, help="file of the controller's stored parameters")
-    parser.add_argument("--serial", type=int, help="of the controller; else new without --nvm")
+    parser.add_argument("--serial", type=int, help="of the controller; else one for each --nvm")
     parser.add_argument("--smrs", type=int, choices=[1, 3], default=1)
     parser.add_argument("--no-base-smrs", action="store_true", help="base nests are empty")
     parser.add_argument("--payload", type=float, default=0.0, help="kg")

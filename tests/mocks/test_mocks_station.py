@@ -215,6 +215,8 @@ def test_controller_with_a_memory_keeps_its_serial_number(tmp_path: Path) -> Non
         process.communicate(timeout=10)
         return str(found)
 
-    nvm = str(tmp_path / "nvm.json")
-    assert serial("--nvm", nvm) == serial("--nvm", nvm) == "1009"
+    first, second = (str(tmp_path / name) for name in ("first.json", "second.json"))
+    number = serial("--nvm", first)
+    assert serial("--nvm", first) == number
+    assert serial("--nvm", second) != number
     assert serial() != serial()
