@@ -15,8 +15,11 @@ Ask = Callable[[str, tuple[str, ...]], Awaitable[str]]
 class Carrier(Protocol):
     """Brings SMRs to nests."""
 
-    async def carry(self, smr: int, nest: str, ask: Ask) -> None:
-        """Bring an SMR to a nest and come back when it is there (to the carrier's belief)."""
+    async def carry(self, smr: int, nest: str, ask: Ask, why: str = "") -> None:
+        """Bring an SMR to a nest and come back when it is there (to the carrier's belief).
+
+        ``why`` says what was wrong where it is not the first time.
+        """
 
 
 class PersonCarries:
@@ -25,10 +28,11 @@ class PersonCarries:
     def __init__(self, smrs: int) -> None:
         self._smrs = smrs
 
-    async def carry(self, smr: int, nest: str, ask: Ask) -> None:
+    async def carry(self, smr: int, nest: str, ask: Ask, why: str = "") -> None:
         """Ask; raises :class:`StoppedByOperator` if the answer is to stop."""
         which = f"SMR {smr}" if self._smrs > 1 else "the SMR"
-        text = f"Put {which} into nest {nest}, keeping the beam on it if you can, then step back."
+        text = f"{why}. " if why else ""
+        text += f"Put {which} into nest {nest}, keeping the beam on it if you can, then step back."
         if await ask(text, ("done", "stop")) == "stop":
             raise StoppedByOperator(f"stopped when {which} was to be carried to nest {nest}")
 
@@ -39,7 +43,7 @@ class MockCarries:
     def __init__(self, host: str, port: int) -> None:
         self._control = MockControl(host, port)
 
-    async def carry(self, smr: int, nest: str, ask: Ask) -> None:
+    async def carry(self, smr: int, nest: str, ask: Ask, why: str = "") -> None:
         """Tell the mock."""
         await self._control.call("carry", smr=smr, nest=nest)
 

@@ -11,14 +11,17 @@ from session_mock import POSES, Heard, Mock
 from app.errors import GateRefused, StoppedByOperator
 from app.session import PlanOptions, Session, measure_plan
 from app.session import events as ev
+from app.session.journal import Journal
 from app.session.ownership import Ownership
 from app.session.plan import Pose
+from app.site import parse_site
 from drivers.errors import (
     DeviceError,
     DriveFault,
     HeartbeatLost,
     LinkError,
     NoTarget,
+    NotReady,
     ParameterError,
 )
 
@@ -298,8 +301,6 @@ async def test_a_knocked_tracker_stand_makes_the_session_begin_anew(
 
     when(heard, session, "read", knock)
     assert await run(session) == 14
-    from app.session.journal import Journal
-
     journal = Journal(session.folder / "journal.sqlite", read_only=True)
     set_aside = [row for row in journal.rows(good_only=False) if row.status == "invalidated"]
     journal.close()
@@ -308,10 +309,47 @@ async def test_a_knocked_tracker_stand_makes_the_session_begin_anew(
 
 
 def _notes(session: Session) -> list[tuple[float, str, str]]:
-    from app.session.journal import Journal
-
     journal = Journal(session.folder / "journal.sqlite", read_only=True)
     try:
         return journal.notes()
     finally:
         journal.close()
+
+
+async def test_a_person_is_asked_to_carry_and_told_what_was_wrong(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    """Here the person is us: each prompt is answered after the SMR was carried, once wrongly."""
+    mock = mock_of("--smrs", "1")
+    text = mock.site.to_toml().replace('kind = "mock"', 'kind = "operator"')
+    text = "\n".join(line for line in text.splitlines() if not line.startswith("control"))
+    site = parse_site(text, "site.toml", tmp_path)
+    session = Session.create(site, measure_plan(site, TWO, CARRIED), tmp_path)
+    session.observers.watch(heard)
+
+    def carry(event: ev.Event) -> None:
+        if isinstance(event, ev.PromptNeeded):
+            wanted = event.text.split("into nest ")[-1][0]
+            wrong = wanted == "4" and event.text.startswith("Put")
+            mock.hands("carry", smr=1, nest="5" if wrong else wanted, follow=False)
+            session.answer_prompt(event.prompt, "done")
+
+    session.observers.watch(carry)
+    assert await run(session) == 14
+    asked = [event.text for event in heard.of(ev.PromptNeeded)]
+    assert len(asked) == len(heard.of(ev.PromptAnswered)) == 4
+    assert "no SMR is seen there" in asked[2] or "nest 5 where nest 4 was expected" in asked[2]
+
+
+async def test_air_outside_the_band_holds_the_job_and_then_ends_it(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3", scale=2000)
+    text = mock.site.to_toml() + "\n[limits]\nair_temp_C = [10.0, 12.0]\n"
+    site = parse_site(text, "site.toml", tmp_path)
+    session = Session.create(site, measure_plan(site, TWO, QUICK), tmp_path, unattended=True)
+    session.observers.watch(heard)
+    with pytest.raises(NotReady, match="the air stays at"):
+        await run(session)
+    assert "the site allows 10 to 12" in heard.of(ev.Suspended)[0].why
+    assert not [r for r in heard.of(ev.ReadingTaken) if r.pose_label]

@@ -21,13 +21,13 @@ async def carry(work: Work, step: Step) -> Done:
     return Done(f"SMR {step.args['smr']} said to be in nest {step.args['nest']}")
 
 
-async def bring(work: Work, smr: int, nest: str) -> None:
+async def bring(work: Work, smr: int, nest: str, why: str = "") -> None:
     """Have an SMR carried, and remember where it is believed to be."""
 
     async def ask(text: str, choices: tuple[str, ...]) -> str:
         return await work.ask(text, choices)
 
-    await work.station.carrier.carry(smr, nest, ask)
+    await work.station.carrier.carry(smr, nest, ask, why)
     work.memory.smr_in[smr] = nest
     work.journal.set_meta("smrs", {str(k): v for k, v in work.memory.smr_in.items()})
     work.memory.aimed_at = ""
@@ -68,10 +68,8 @@ def wrong_hole(nest: str, what: str) -> NoTarget:
 
 async def again(work: Work, nest: str, why: str) -> None:
     """Have the SMR of a nest put right."""
-    if not work.unattended and work.site.hands.kind == "operator":
-        await work.ask(f"{why}. Put the SMR into nest {nest}.", ("done", "stop"))
     smr = next((s for s, n in work.memory.smr_in.items() if n == nest), 1)
-    await bring(work, smr, nest)
+    await bring(work, smr, nest, why)
 
 
 async def _look(work: Work, nest: str) -> str:
