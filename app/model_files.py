@@ -5,6 +5,7 @@ never written to.
 """
 
 import tomllib
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,20 +13,27 @@ from typing import Any
 import tomli_w
 
 from app.run_files import read_text
-from calib.effects import Effect, effect_named
+from calib.arrays import Array
+from calib.effects import Effect, Signature, Situation, Unknown, effect_named
+from calib.effects.operator import effect_from_text
 from calib.errors import BadInput
 from calib.identify import Fit, fit_report
 from calib.mechanism.description import Machine
+from calib.runs.stack import Rows
 
 FORMAT = "pkm-model/1"
 
 
 @dataclass(frozen=True)
 class ModelFile:
-    """What a model file says; ``values`` and ``sigmas`` are by parameter name."""
+    """What a model file says; ``values`` and ``sigmas`` are by parameter name.
+
+    ``own`` holds the texts of the operator's own effects, so that the model file is complete.
+    """
 
     machine: str
     effects: tuple[str, ...]
+    own: dict[str, str] = field(default_factory=dict)
     values: dict[str, float] = field(default_factory=dict)
     sigmas: dict[str, float] = field(default_factory=dict)
 
@@ -55,7 +63,10 @@ def read_model(path: Path) -> ModelFile:
             place=str(path),
             remedy="Expected name, value and sigma",
         ) from error
-    return ModelFile(str(table.get("machine", "")), tuple(effects), values, sigmas)
+    own = table.get("own_effects", {})
+    if not isinstance(own, dict) or not all(isinstance(text, str) for text in own.values()):
+        raise BadInput("own_effects is no table of texts", place=str(path))
+    return ModelFile(str(table.get("machine", "")), tuple(effects), own, values, sigmas)
 
 
 def write_model(path: Path, fit: Fit) -> None:
@@ -68,6 +79,9 @@ def write_model(path: Path, fit: Fit) -> None:
         "machine": fit.model.rows.runs[0].header.machine,
         "runs": [run.source for run in fit.model.rows.runs],
         "effects": report["effects"],
+        "own_effects": {
+            effect.id: effect.text for effect in fit.model.effects if isinstance(effect, OwnEffect)
+        },
         "quality": {
             key: value
             for key, value in report.items()
@@ -86,10 +100,65 @@ def write_model(path: Path, fit: Fit) -> None:
     path.write_text(tomli_w.dumps(table), encoding="utf-8")
 
 
+class OwnEffect(Effect):
+    """An operator's effect together with the text of its file."""
+
+    def __init__(self, effect: Effect, text: str) -> None:
+        self.id, self.kind, self.says = effect.id, effect.kind, effect.says
+        self.channels, self.depends = effect.channels, effect.depends
+        self.text = text
+        self._effect = effect
+
+    def applies(self, machine: Machine) -> bool:
+        """As the operator's effect says."""
+        return self._effect.applies(machine)
+
+    def unavailable(self, rows: Rows) -> str:
+        """As the operator's effect says."""
+        return self._effect.unavailable(rows)
+
+    def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
+        """As the operator's effect says."""
+        return self._effect.unknowns(rows)
+
+    def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
+        """As the operator's effect says."""
+        return self._effect.parts(rows)
+
+    def trials(self, rows: Rows) -> Iterator[tuple[float, ...]]:
+        """As the operator's effect says."""
+        return self._effect.trials(rows)
+
+    def signature(self, situation: Situation, values: Array) -> Signature:
+        """As the operator's effect says."""
+        return self._effect.signature(situation, values)
+
+
+def read_own_effect(path: Path) -> OwnEffect:
+    """Read an operator's effect file; raises BadInput with file, line and column of a fault."""
+    text = read_text(path)
+    return OwnEffect(effect_from_text(text, str(path)), text)
+
+
 def chosen_effects(
     machine: Machine, add: tuple[str, ...], model: Path | None
 ) -> tuple[list[Effect], ModelFile | None]:
-    """Effects named by ``--model FILE`` and ``--add EFFECT``, each once, in that order."""
+    """Effects of ``--model FILE`` and ``--add EFFECT``, each once, in that order.
+
+    What ends in ``.toml`` after ``--add`` is an operator's own effect file.
+    """
     saved = read_model(model) if model is not None else None
-    names = dict.fromkeys([*(saved.effects if saved else ()), *add])
-    return [effect_named(name, machine) for name in names], saved
+    chosen: dict[str, Effect] = {}
+    for name in saved.effects if saved else ():
+        own = saved.own.get(name) if saved else None
+        chosen[name] = (
+            effect_named(name, machine)
+            if own is None
+            else OwnEffect(effect_from_text(own, f"{model}, own_effects.{name}"), own)
+        )
+    for name in add:
+        effect = (
+            read_own_effect(Path(name)) if name.endswith(".toml") else effect_named(name, machine)
+        )
+        chosen[effect.id] = effect
+    return list(chosen.values()), saved

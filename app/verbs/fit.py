@@ -11,8 +11,8 @@ import click
 from app import answer
 from app.analysis import load_rows, model_options
 from app.model_files import write_model
-from calib.identify import fit, fit_report
-from calib.model import Model
+from calib.discover.run_diagnosis import fit_effects
+from calib.identify import fit_report
 
 
 @click.command()
@@ -35,7 +35,7 @@ def command(
     place of the tracker. Nothing is written but the file named with --save.
     """
     rows, effects = load_rows(runs, add, model)
-    found = fit(Model(rows, effects))
+    found = fit_effects(rows, effects)
     report = fit_report(found)
     if save is not None:
         write_model(save, found)
