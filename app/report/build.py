@@ -10,9 +10,9 @@ from app.machine_files import read_text
 from app.report.calibration import Checked, calibration_page
 from app.session.plan import Plan
 from app.verification import FORMAT
+from calib.discover.run_diagnosis import fit_effects
 from calib.errors import BadInput
-from calib.identify import fit, fit_report
-from calib.model import Model
+from calib.identify import fit_report
 
 
 def write_report(
@@ -45,7 +45,7 @@ def write_report(
         For runs, models and verifications that cannot be read, and a page that cannot be written.
     """
     rows, effects = load_rows(runs, add, model)
-    found = fit(Model(rows, effects))
+    found = fit_effects(rows, effects)
     said = fit_report(found)
     page = calibration_page(
         title or f"Calibration of {rows.machine.name}",
