@@ -17,18 +17,14 @@ from mocks.canopen.compensation import Compensation, direction_of
 from mocks.canopen.drive402 import COUNTS_PER_MM, PEAK_SPEED, Drive
 from mocks.canopen.hexapod_kinematics import HexapodKinematics, Unreachable
 from mocks.canopen.node import (
-    ABORT_CANNOT_STORE,
-    ABORT_DEVICE_STATE,
     ABORT_RANGE,
     EMCY_HEARTBEAT,
-    LOAD,
-    SAVE,
     StationNode,
-    check_signature,
 )
 from mocks.canopen.parameter_server import ParameterServer
 from mocks.canopen.parameters import ParameterSet
 from mocks.canopen.ports import Machine
+from mocks.canopen.state402 import State
 
 SHORTEST_MOVE_S = 0.01
 EMCY_MEMORY = 0x5530
@@ -109,14 +105,16 @@ class Controller(StationNode):
             self.writers[0x2400, axis] = partial(self._on_pose, axis)
             self.writers[0x2402, axis] = _check_finite
         self.writers |= {
-            (0x1010, 1): self._on_store,
-            (0x1011, 1): self._on_restore,
             (0x2401, 2): self._on_command,
             (0x2430, 0): _check_speed,
-            (0x2501, 1): self._on_reload,
         }
 
     # ------------------------------------------------------------ state
+
+    @property
+    def any_drive_enabled(self) -> bool:
+        """Whether a motor has power: nothing may be changed under it."""
+        return any(drive.state is State.OPERATION_ENABLED for drive in self.drives)
 
     @property
     def enabled(self) -> bool:
@@ -130,11 +128,8 @@ class Controller(StationNode):
         bits |= ARRIVED if self._arrived else 0
         bits |= FAULTED if any(drive.faulted for drive in self.drives) else 0
         bits |= ALL_REFERENCED if all(drive.referenced for drive in self.drives) else 0
-        bits |= UNSTORED if self.parameters.active != self._stored() else 0
+        bits |= UNSTORED if self.parameters.active != self.parameters.kept else 0
         return bits | (INTERRUPTED if self._interrupted else 0)
-
-    def _stored(self) -> dict[str, float]:
-        return self.parameters.stored or self.parameters.defaults
 
     def _reference(self, n: int) -> float:
         """q of actuator ``n`` at extension 0."""
@@ -275,33 +270,6 @@ class Controller(StationNode):
             drive.leg.stop()
         if self._under_way:
             self._under_way, self._interrupted = False, True
-
-    # ------------------------------------------------------------ storing
-
-    def _motion_is_enabled(self) -> bool:
-        return any(drive.state.name == "OPERATION_ENABLED" for drive in self.drives)
-
-    def refuse_in_motion(self) -> None:
-        """Abort an access that is allowed only while no drive is enabled."""
-        if self._motion_is_enabled():
-            raise SdoAbortedError(ABORT_DEVICE_STATE)
-
-    def _on_store(self, signature: int) -> None:
-        check_signature(signature, SAVE)
-        self.refuse_in_motion()
-        if "store-refused" in self.machine.faults:
-            raise SdoAbortedError(ABORT_CANNOT_STORE)
-        self.parameters.store()
-
-    def _on_restore(self, signature: int) -> None:
-        check_signature(signature, LOAD)
-        self.refuse_in_motion()
-        self.parameters.forget()
-
-    def _on_reload(self, signature: int) -> None:
-        check_signature(signature, LOAD)
-        self.refuse_in_motion()
-        self.parameters.reload()
 
     # ------------------------------------------------------------ what happens by itself
 

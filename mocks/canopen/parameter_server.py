@@ -1,12 +1,21 @@
 """How the controller shows its parameters on the wire, with what has been made to go wrong."""
 
 import math
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
 from canopen.sdo.exceptions import SdoAbortedError
 
-from mocks.canopen.node import ABORT_RANGE, real64_block
+from mocks.canopen.node import (
+    ABORT_CANNOT_STORE,
+    ABORT_DEVICE_STATE,
+    ABORT_RANGE,
+    LOAD,
+    SAVE,
+    check_signature,
+    real64_block,
+)
 from mocks.canopen.parameters import ParameterSet, acceptable
 from mocks.canopen.ports import Faults
 
@@ -35,10 +44,27 @@ class ParameterServer:
             controller.writers[address] = partial(self._write, name)
         controller.readers |= {
             (0x2500, 1): lambda: parameters.checksum(self._shown()),
-            (0x2500, 2): lambda: parameters.checksum(parameters.stored or parameters.defaults),
+            (0x2500, 2): lambda: parameters.checksum(parameters.kept),
             (0x2502, 0): lambda: self._block(list(parameters.kinematic)),
             (0x2503, 0): lambda: self._block(list(parameters.compensation)),
         }
+        controller.writers |= {
+            (0x1010, 1): partial(self._keep, SAVE, parameters.store),
+            (0x1011, 1): partial(self._keep, LOAD, parameters.forget),
+            (0x2501, 1): partial(self._keep, LOAD, parameters.reload),
+        }
+
+    def _keep(self, signature: int, action: Callable[[], None], value: int) -> None:
+        """Store, restore or reload: with the signature, and with no motor under power."""
+        check_signature(value, signature)
+        self._refuse_under_power()
+        if signature == SAVE and "store-refused" in self._faults:
+            raise SdoAbortedError(ABORT_CANNOT_STORE)
+        action()
+
+    def _refuse_under_power(self) -> None:
+        if self._controller.any_drive_enabled:
+            raise SdoAbortedError(ABORT_DEVICE_STATE)
 
     def _shown(self) -> dict[str, float]:
         shown = dict(self._parameters.active)
@@ -60,7 +86,7 @@ class ParameterServer:
         return real64_block(values, self._parameters.checksum(shown))
 
     def _write(self, name: str, value: float) -> None:
-        self._controller.refuse_in_motion()
+        self._refuse_under_power()
         if name in self._faults.arguments("write-refused"):
             raise SdoAbortedError(ABORT_HARDWARE)
         if not acceptable(name, value, self._parameters.defaults[name]):

@@ -72,13 +72,18 @@ class ParameterSet:
         intact = True
         if self._path is not None:
             self.stored, intact = self._read_memory(self._path)
-        self.active = dict(self.stored or self.defaults)
+        self.active = dict(self.kept)
         return intact
 
     def store(self) -> None:
         """Keep the active set."""
         self.stored = dict(self.active)
         self._write_memory()
+
+    @property
+    def kept(self) -> dict[str, float]:
+        """What the next boot would take: the stored set, else the defaults."""
+        return self.stored or self.defaults
 
     def forget(self) -> None:
         """Forget the stored set: the next boot takes the defaults (0x1011)."""
@@ -88,7 +93,7 @@ class ParameterSet:
 
     def reload(self) -> None:
         """Bring the stored set, or else the defaults, back into use."""
-        self.active = dict(self.stored or self.defaults)
+        self.active = dict(self.kept)
 
     def checksum(self, values: Mapping[str, float] | None = None) -> int:
         """CRC-32 (zlib) over the little-endian REAL64 values, kinematic then compensation."""
