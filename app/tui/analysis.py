@@ -1,7 +1,6 @@
 """What the Fit screen shows: a fit, and how far the readings were off before it."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -43,8 +42,3 @@ def identify(runs: tuple[str, ...], effects: tuple[str, ...] = ()) -> FitAnswer:
     before = np.linalg.norm(nominal.residual[:, found.accepted], axis=0)
     after = np.linalg.norm(found.linear.residual[:, found.accepted], axis=0)
     return FitAnswer(runs, effects, found, fit_report(found), before, after)
-
-
-def runs_under(root: Path) -> list[Path]:
-    """Run folders of the sessions under ``root``, newest first."""
-    return sorted((path.parent for path in root.glob("*/run/run.toml")), reverse=True)

@@ -1,5 +1,6 @@
 """Apply: what would be written, what the gates say, write and try, keep or put back, undo."""
 
+from collections.abc import Mapping
 from functools import partial
 from typing import ClassVar
 
@@ -45,9 +46,7 @@ class ApplyFace(Face):
     def body(self) -> ComposeResult:
         """Changes to the left; gates, stages and snapshots to the right."""
         with Horizontal(id="apply"):
-            yield DataTable(
-                id="apply-table", cursor_type="row", zebra_stripes=True, cell_padding=0
-            )
+            yield DataTable(id="apply-table", cursor_type="row", zebra_stripes=True, cell_padding=0)
             with Vertical(id="apply-right"):
                 yield Static(id="apply-gates", classes="panel")
                 yield Static(id="apply-stages", classes="panel")
@@ -67,7 +66,8 @@ class ApplyFace(Face):
         comparison = corrections.comparison
         self.query_one("#apply-gates", Static).update(gates_text(picture.gates, self.wide))
         stages = self.query_one("#apply-stages", Static)
-        stages.update(stages_text(picture, stages.content_size.height or 6))
+        left_out = comparison.proposal.left_out if comparison is not None else {}
+        stages.update(stages_text(picture, left_out, stages.content_size.height or 6))
         self.query_one("#apply-sets", Static).update(sets_text(corrections.snapshots))
         drawn = (comparison, self.wide, self.desk.answer_fit)
         if drawn != self._drawn:
@@ -96,8 +96,6 @@ class ApplyFace(Face):
             table.add_row(
                 Text(change.name, style), *(Text(cell, style, justify="right") for cell in cells)
             )
-        for name, why in comparison.proposal.left_out.items():
-            table.add_row(Text(name, "#e8b45a"), Text("not written:"), Text(why))
         count = len(comparison.proposal.changes)
         table.border_subtitle = f"{count} values; a writes them"
 
@@ -180,10 +178,14 @@ def gates_text(gates: list[GateChecked], wide: bool) -> Content:
     return Content("\n").join(lines)
 
 
-def stages_text(picture: Picture, most: int) -> Content:
+def stages_text(picture: Picture, left_out: Mapping[str, str], most: int) -> Content:
     """The stages so far; the last one is the present one while the job runs."""
     if not picture.stages:
-        return Content.from_markup("[dim]nothing written[/]")
+        lines = [Content.from_markup("[dim]nothing written[/]")]
+        for name, why in left_out.items():
+            text = Content.assemble((f"– {name} ", "$warning"), f"will not be: {why}")
+            lines.append(text)
+        return Content("\n").join(lines)
     lines = []
     for number, stage in enumerate(picture.stages):
         last = number == len(picture.stages) - 1

@@ -20,9 +20,10 @@ from app.session.plan import Plan
 from app.session.session import Outcome, Session
 from app.session.station import Station
 from app.site import Site, load_site, site_of_mock
-from app.tui.analysis import FitAnswer, identify, runs_under
+from app.tui.analysis import FitAnswer, identify
 from app.tui.correction import KEEP, Corrections
 from app.tui.picture import Picture
+from app.tui.shelf import runs_under
 from app.tui.verifying import Verified, verification_plan, verified
 from calib.errors import BadInput
 from drivers.errors import ConnectFailed, DeviceError, Silence

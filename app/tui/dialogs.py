@@ -98,7 +98,7 @@ class Choose(Dialog[str]):
 class Ask(Choose):
     """The session's question. Escape lets the operator look first; the question stays."""
 
-    escape_says: ClassVar[str] = "esc: look at the screen first, a comes back here"
+    escape_says: ClassVar[str] = "esc: look at the screen first, r comes back here"
 
     def __init__(self, prompt: PromptNeeded, asked_still: Callable[[], bool]) -> None:
         super().__init__(
@@ -147,6 +147,10 @@ class Pick(Dialog[str]):
         """What is asked, and the list."""
         yield Static(Content(self._text), classes="dialog-text")
         yield OptionList(*(Option(Content(says), id=key) for key, says in self._options))
+
+    def on_mount(self) -> None:
+        """Propose the first."""
+        self.query_one(OptionList).highlighted = 0
 
     @on(OptionList.OptionSelected)
     def _picked(self, event: OptionList.OptionSelected) -> None:

@@ -12,10 +12,11 @@ from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.content import Content
 from textual.widgets import DataTable, Static
 
-from app.tui.analysis import FitAnswer, runs_under
+from app.tui.analysis import FitAnswer
 from app.tui.dialogs import Enter, Pick
 from app.tui.face import Face
 from app.tui.picture import Picture
+from app.tui.shelf import runs_under
 from app.tui.widgets.plots import PairPlot
 
 

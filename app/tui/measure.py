@@ -15,6 +15,7 @@ from app.tui.dialogs import Pick
 from app.tui.face import Face
 from app.tui.picture import Picture
 from app.tui.planning import NewRun, RunWish, plan_for
+from app.tui.shelf import unfinished
 from app.tui.widgets.plots import MissPlot, ScatterPlot
 from app.tui.widgets.steplist import StepList
 
@@ -115,22 +116,6 @@ class MeasureFace(Face):
 
         options = [(str(folder), folder.name) for folder in folders]
         self.app.push_screen(Pick("Go on with", "Sessions, newest first", options), picked)
-
-
-def unfinished(root: Path) -> list[Path]:
-    """Sessions under ``root`` that have a journal but no exported run; newest first.
-
-    Check poses of a write-back are not among them: what they were to check has been put back.
-    """
-    return sorted(
-        (
-            journal.parent
-            for journal in root.glob("*/journal.sqlite")
-            if not journal.parent.name.rstrip("-0123456789").endswith("-check")
-            and not (journal.parent / "run" / "run.toml").is_file()
-        ),
-        reverse=True,
-    )
 
 
 def now_text(picture: Picture, wide: bool) -> Content:

@@ -48,7 +48,7 @@ class Workbench(App[None]):
                     tooltip=f"Show the screen {face.label}")
             for number, face in enumerate(FACES, start=1)
         ),
-        Binding("a", "answer", "Answer", show=False, tooltip="Answer what the job asks"),
+        Binding("r", "answer", "Reply", show=False, tooltip="Reply to what the job asks"),
         Binding("b", "hide_banner", "Hide banner", show=False,
                 tooltip="Hide the banner; its text stays in the log"),
         Binding("f1", "help", "Help", tooltip="What this screen is for, and its keys"),

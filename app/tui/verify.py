@@ -14,7 +14,8 @@ from textual.widgets import DataTable, Static
 from app.tui.dialogs import Choose, Pick
 from app.tui.face import Face
 from app.tui.picture import Picture
-from app.tui.verifying import Verified, finished_verifications
+from app.tui.shelf import finished_verifications
+from app.tui.verifying import Verified
 from app.tui.widgets.plots import PairPlot
 from app.verification import PAPER, Summary
 

@@ -62,8 +62,3 @@ def verified(folder: Path) -> Verified:
     position = 1e3 * np.linalg.norm(found.position_mm, axis=0)
     angle = 1e3 * np.rad2deg(np.linalg.norm(found.rotation_rad, axis=0))
     return Verified(folder, found, np.array([position, angle]))
-
-
-def finished_verifications(root: Path) -> list[Path]:
-    """Folders of finished verification sessions, newest first."""
-    return sorted((p.parent.parent for p in root.glob("*-verify*/run/run.toml")), reverse=True)

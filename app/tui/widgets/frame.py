@@ -36,13 +36,14 @@ class TopLine(Horizontal):
         state = self.query_one("#top-state", Static)
         state.update(Content(state_text(picture, connected)))
         for name in _RUN:
-            state.set_class(picture.run == name, f"-{name}")
+            state.set_class(picture.run == name and picture.prompt is None, f"-{name}")
+        state.set_class(picture.prompt is not None, "-asking")
 
 
 def state_text(picture: Picture, connected: bool) -> str:
     """Say in a few words what goes on, the most urgent first."""
     if picture.prompt is not None:
-        return "? asks you: a answers"
+        return "? asks you: r replies"
     if picture.run == "idle":
         return "● connected" if connected else "○ not connected"
     text = _RUN[picture.run]

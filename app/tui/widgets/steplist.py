@@ -26,10 +26,20 @@ class StepList(ScrollView, can_focus=True):
         if len(steps) != self.virtual_size.height:
             self.virtual_size = Size(0, len(steps))
         self._steps = steps
-        if current != self._current and current is not None and not self.has_focus:
-            self.scroll_to(y=max(0, current - self.size.height // 2), animate=False, force=True)
+        moved = current != self._current
         self._current = current
+        if moved:
+            self._follow()
         self.refresh()
+
+    def on_resize(self) -> None:
+        """Keep the step in work in the middle."""
+        self._follow()
+
+    def _follow(self) -> None:
+        if self._current is not None and not self.has_focus:
+            middle = max(0, self._current - self.size.height // 2)
+            self.scroll_to(y=middle, animate=False, force=True)
 
     def render_line(self, y: int) -> Strip:
         """Draw one line."""

@@ -1,0 +1,172 @@
+"""A recorded stream of a session's events, and what else the screens need to be looked at."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from app.session import PlanOptions, Session, measure_plan
+from app.session import events as ev
+from app.session.known import Snapshot
+from app.session.plan import Plan
+from app.site import Site
+from app.tui.correction import Comparison
+from app.tui.program import Workbench
+from app.tui.verifying import Verified
+from app.verification import Verification
+from app.writeback.proposal import Change, Proposal
+from drivers.interface import (
+    ActuatorState,
+    Alarm,
+    ControllerState,
+    Identity,
+    TrackerState,
+)
+
+SITE = """
+format = "pkm-site/1"
+title = "Cell 4, hexapod"
+machine = "hexapod"
+[controller]
+kind = "canopen"
+channel = "socket://127.0.0.1:40001"
+[tracker]
+kind = "emscon"
+address = "127.0.0.1:700"
+frame = [-900.0, -900.0, -400.0, 0.0, 0.0, 0.3]
+[nests.platform]
+"3" = [0.0, 100.0, 0.0]
+"4" = [-86.6, -50.0, 0.0]
+"5" = [86.6, -50.0, 0.0]
+[nests.base]
+b1 = [260.0, 0.0, -30.0]
+b2 = [0.0, 260.0, -30.0]
+b3 = [-260.0, 0.0, -30.0]
+"""
+
+CONTROLLER = Identity("canopen", "", "pkmcal hexapod controller", "1001", "1.0.0")
+TRACKER = Identity("emscon", "", "AT901-LR", "390793", "3.6")
+QUESTION = ev.PromptNeeded(
+    "prompt-1",
+    "Put the SMR into nest 4, keeping the beam on it if you can, then step back.",
+    ("done", "stop"),
+    None,
+)
+
+
+def plan_of(site: Site, poses: int = 12) -> Plan:
+    """A measuring plan over poses on a circle."""
+    angles = np.linspace(0.0, 2.0 * math.pi, poses, endpoint=False)
+    path = {
+        f"p{number:02d}": (30 * math.cos(a), 30 * math.sin(a), 220.0, 0.1, -0.1, 0.05)
+        for number, a in enumerate(angles, start=1)
+    }
+    return measure_plan(site, path, PlanOptions())
+
+
+def connected() -> list[ev.Event]:
+    """Both devices answer; a drive complains."""
+    actuators = tuple(
+        ActuatorState(f"q{leg}", 230.715 + leg, 230.715 + leg, "operation enabled", leg == 2, True)
+        for leg in range(1, 7)
+    )
+    channels = {"structure_temp_C": 20.53, "payload_kg": 0.0}
+    return [
+        ev.Connected("controller", CONTROLLER, "socket://127.0.0.1:40001"),
+        ev.Connected("tracker", TRACKER, "127.0.0.1:700"),
+        ev.DeviceStates(
+            ControllerState(actuators, True, True, channels),
+            TrackerState(True, True, True, True, "CCR-1.5in", 1),
+        ),
+        ev.AlarmRaised(
+            Alarm("tracker", "air pressure is 40 min old", "Check the weather station"), 61.0
+        ),
+    ]
+
+
+def measured(plan: Plan, until: int) -> list[ev.Event]:
+    """The first steps of a plan, as the engine tells of them; the step ``until`` is in work."""
+    told: list[ev.Event] = []
+    number = 0
+    for index, step in enumerate(plan.steps[: until + 1]):
+        time_s = 10.0 * index
+        told.append(ev.StepStarted(step.id, index, step.kind, step.says, 1, time_s))
+        if index == until:
+            break
+        if step.kind == "move":
+            pose = plan.poses[step.args["pose"]]
+            q = tuple(230.0 + 3.0 * math.sin(index + leg) for leg in range(6))
+            told.append(ev.PoseCommanded(step.args["pose"], pose, q, time_s))
+        if step.kind in ("read", "reference"):
+            number += 1
+            miss = 0.6 + 0.2 * math.sin(index) if step.kind == "read" else 0.008
+            told += [ev.LiveScatter(0.03 / (1 + k), 0.02, (0.0, 0.0, 0.0), k > 1) for k in range(5)]
+            told.append(
+                ev.ReadingTaken(
+                    number, str(step.args.get("pose", "")), step.args["nest"], (230.0,) * 6,
+                    (0.0, 0.0, 0.0), (0.0, 0.0, miss), miss, 0.006, time_s,
+                )
+            )  # fmt: skip
+        if step.kind == "drift":
+            told.append(ev.FrameFound((0.0,) * 6, 0.0041, ("b1", "b2", "b3")))
+            told.append(ev.DriftChecked(0.0067, 0.05, time_s))
+        told.append(ev.StepDone(step.id, index, f"{step.says}: done", time_s + 5.0))
+        told.append(ev.Progress(index + 1, len(plan.steps), 600.0 - index))
+    return told
+
+
+async def put_up(bench: Workbench, folder: Path, until: int = 30) -> Session:
+    """Open a site and show a session that measures, without devices."""
+    path = folder / "site.toml"
+    path.write_text(SITE, encoding="utf-8")
+    desk = bench.desk
+    await desk.open_site(path)
+    assert desk.site is not None
+    plan = plan_of(desk.site)
+    session = Session.create(desk.site, plan, folder / "sessions", station=desk.station)
+    for event in connected():
+        desk.picture.tell(event)
+    desk.picture.begin(session)
+    for event in measured(plan, until):
+        desk.picture.tell(event)
+    return session
+
+
+def verified(size_um: float, seed: int) -> Verified:
+    """A verification with errors of a size."""
+    generator = np.random.default_rng(seed)
+    labels = tuple(f"n{node:02d}o{turn}" for node in range(1, 28) for turn in range(1, 9))
+    position = generator.normal(0.0, size_um * 1e-3 / 2.0, (3, len(labels)))
+    rotation = generator.normal(0.0, size_um * 2e-6, (3, len(labels)))
+    found = Verification(labels, position, rotation, 8.5, 0.0055, position * 0.9, rotation * 0.9)
+    errors = np.array(
+        [
+            1e3 * np.linalg.norm(position, axis=0),
+            1e3 * np.rad2deg(np.linalg.norm(rotation, axis=0)),
+        ]
+    )
+    return Verified(Path("sessions"), found, errors)
+
+
+def compared() -> Comparison:
+    """A proposal with its gates."""
+    changes = tuple(
+        Change(f"leg{leg}.{name}", 100.0 + leg, 100.1 + leg, 0.01 * leg, "mm", name != "L_B")
+        for leg in range(1, 7)
+        for name in ("B_x", "B_y", "B_z", "L_B")
+    )
+    left_out = {"tracker-scale": "an effect of the measurement, never written to a machine"}
+    gates = (
+        ev.GateChecked("finite", True, 0.0, 0.0, "", "finite: 0 odd values (at most 0)"),
+        ev.GateChecked("chi2", True, 1.04, 4.0, "", "chi2: 1.04 (at most 4)"),
+        ev.GateChecked("holdout", False, 1.73, 1.5, "", "holdout: 1.73 (at most 1.5)"),
+    )
+    return Comparison(Path("model.toml"), Proposal(changes, left_out), gates)
+
+
+def snapshots() -> tuple[Snapshot, ...]:
+    """Two earlier parameter sets."""
+    return tuple(
+        Snapshot(n, f"2026-11-0{n}T08:00:00+00:00", why, "hexapod", CONTROLLER, 7, {"leg1.L0": 1.0})
+        for n, why in ((1, "before applying model.toml"), (2, "applied model.toml"))
+    )
