@@ -129,6 +129,10 @@ class OwnEffect(Effect):
         """As the operator's effect says."""
         return self._effect.trials(rows)
 
+    def refined(self, rows: Rows, trial: tuple[float, ...]) -> Iterator[tuple[float, ...]]:
+        """As the operator's effect says."""
+        return self._effect.refined(rows, trial)
+
     def signature(self, situation: Situation, values: Array) -> Signature:
         """As the operator's effect says."""
         return self._effect.signature(situation, values)

@@ -10,6 +10,7 @@ from calib.arrays import Array, BoolArray
 from calib.discover.diagnosis import Diagnosis, Finding, diagnose
 from calib.discover.run_problem import (
     EffectColumns,
+    columns_at,
     effect_candidates,
     effect_columns,
     problem_of,
@@ -190,16 +191,23 @@ def begin_at(state: State, values: tuple[Array, ...]) -> State:
 
 def _searched(latest: Fit, one: EffectColumns) -> State:
     """Start at the trial that explains most of the residual, with its amplitudes."""
+    best, _ = _best_trial(latest, one)
+    closer = tuple(one.effect.refined(latest.model.rows, one.trials[best]))
+    fine = columns_at(latest, one.effect, closer)
+    best, amplitudes = _best_trial(latest, fine)
+    state = latest.linear.state
+    return begin_at(state, (*state.effects, fine.values(closer[best], amplitudes)))
+
+
+def _best_trial(latest: Fit, one: EffectColumns) -> tuple[int, Array]:
+    """Trial with the largest fall of chi-square, and its amplitudes."""
     problem = problem_of(latest)
     columns = one.columns[..., latest.accepted]
     columns = columns.reshape(*one.columns.shape[:2], -1)
     projected = problem.project(columns)
-    weight = columns @ projected.swapaxes(1, 2)
     sizes = np.array([u.sigma or 1e3 * u.size for u in one.unknowns if not u.nonlinear])
-    weight = weight + np.diag(1.0 / sizes**2)
+    weight = columns @ projected.swapaxes(1, 2) + np.diag(1.0 / sizes**2)
     scores = columns @ problem.residual
     amplitudes = np.linalg.solve(weight, scores[:, :, None])[:, :, 0]
     best = int(np.argmax(np.sum(amplitudes * scores, axis=1)))
-    values = one.values(one.trials[best], amplitudes[best])
-    state = latest.linear.state
-    return begin_at(state, (*state.effects, values))
+    return best, amplitudes[best]

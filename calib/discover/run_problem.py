@@ -60,10 +60,14 @@ def effect_columns(fit: Fit, effects: Sequence[Effect]) -> list[EffectColumns]:
 
 
 def _columns(fit: Fit, effect: Effect) -> EffectColumns:
+    return columns_at(fit, effect, tuple(effect.trials(fit.model.rows)))
+
+
+def columns_at(fit: Fit, effect: Effect, trials: tuple[tuple[float, ...], ...]) -> EffectColumns:
+    """Signatures of one effect at given trial values."""
     rows, situation = fit.model.rows, fit.linear.situation
     unknowns = effect.unknowns(rows)
     linear = np.array([not unknown.nonlinear for unknown in unknowns])
-    trials = tuple(effect.trials(rows))
     signatures = [effect.signature(situation, at_trial(unknowns, trial)) for trial in trials]
     parts = [whitened_columns(one, situation) for one in _merged(signatures, linear)]
     columns = np.concatenate(parts).reshape(len(trials), int(linear.sum()), 3, rows.count)

@@ -158,6 +158,10 @@ class Effect(ABC):
         """Values of the nonlinear unknowns to be searched, in the order of the unknowns."""
         yield ()
 
+    def refined(self, rows: Rows, trial: tuple[float, ...]) -> Iterator[tuple[float, ...]]:
+        """Values closer about the best trial, for unknowns that the fit cannot move itself."""
+        yield trial
+
     @abstractmethod
     def signature(self, situation: Situation, values: Array) -> Signature:
         """Derivatives at ``values`` (U,)."""

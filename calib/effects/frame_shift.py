@@ -50,6 +50,14 @@ class FrameShift(Effect):
             for moment in _moments(rows):
                 yield (float(moment), where)
 
+    def refined(self, rows: Rows, trial: tuple[float, ...]) -> Iterator[tuple[float, ...]]:
+        """Every moment between the neighbouring ones that were tried."""
+        tried, every = _moments(rows), _every_moment(rows)
+        at = int(np.searchsorted(tried, trial[0]))
+        low, high = tried[max(at - 1, 0)], tried[min(at + 1, tried.size - 1)]
+        for moment in every[(every >= low) & (every <= high)]:
+            yield (float(moment), trial[1])
+
     def signature(self, situation: Situation, values: Array) -> Signature:
         """A rigid motion of everything read after the moment."""
         rows = situation.rows
@@ -66,14 +74,19 @@ class FrameShift(Effect):
 
 
 def _moments(rows: Rows) -> Array:
+    """Moments that are tried first."""
+    between = _every_moment(rows)
+    if between.size <= MOMENTS:
+        return between
+    return np.asarray(between[np.linspace(0, between.size - 1, MOMENTS).astype(int)])
+
+
+def _every_moment(rows: Rows) -> Array:
     """Moments between successive readings, away from the ends of the run."""
     times = np.sort(rows.time_s)
     edge = max(2, int(EDGE * times.size))
     inner = times[edge : times.size - edge]
-    between = 0.5 * (inner[1:] + inner[:-1])[np.diff(inner) > 0]
-    if between.size <= MOMENTS:
-        return between
-    return np.asarray(between[np.linspace(0, between.size - 1, MOMENTS).astype(int)])
+    return np.asarray(0.5 * (inner[1:] + inner[:-1])[np.diff(inner) > 0])
 
 
 EFFECTS = (FrameShift(),)

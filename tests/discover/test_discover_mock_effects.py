@@ -1,0 +1,83 @@
+"""Every effect of the catalogue, hidden by the mock's own physics, is found back with its size.
+
+The mock shares no code with the effects (docs/architecture.md), so signs, units and reference
+points are checked against independent formulas.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.machine_files import load_machine
+from calib.discover.run_diagnosis import fit_effects
+from calib.discover.run_problem import columns_at
+from calib.effects import effect_named
+from calib.runs import parse_run
+from calib.runs.stack import stack
+from mocks.physics.hidden import Hidden
+from mocks.physics.truth import machine_file, nominal_parameters
+from mocks.simulate.files import points_csv, run_toml
+from mocks.simulate.plan import Profile, RunPlan
+from mocks.simulate.run import simulate
+
+HIDDEN = {
+    "backlash": {"backlash.leg2": 0.02, "backlash.leg5": 0.01},
+    "gravity-sag": {"gravity-sag.c": 2e-4},
+    "nest-offset": {"nest-offset.4.x": 0.03, "nest-offset.4.z": -0.05},
+    "screw-cyclic": {
+        "screw-cyclic.leg1.sin": 0.01,
+        "screw-cyclic.leg4.cos": -0.01,
+        "screw-cyclic.period": 3.3,
+    },
+    "screw-pitch": {"screw-pitch.leg1": 1e-3, "screw-pitch.leg6": -5e-4},
+    "screw-twist": {"screw-twist.L": 1.5},
+    "settling": {"settling.k": 2e-3, "settling.tau": 2.0},
+    "thermal-growth": {"thermal-growth.a": 1.2e-5},
+    "tracker-drift": {"tracker-drift.vx": 0.05, "tracker-drift.wz": 3e-5},
+    "tracker-offset": {"tracker-offset.r0": 0.1},
+    "tracker-scale": {"tracker-scale.k": 1e-4},
+    "frame-shift": {"frame-shift.x": 0.05, "frame-shift.ry": 2e-4, "frame-shift.t0": 700.0},
+}
+PROFILE = Profile(rise_K=8.0, payload_kg=(0.0, 12.0, 0.0, 12.0))
+
+
+@pytest.mark.parametrize("effect", sorted(HIDDEN))
+def test_discover_mock_effect_is_measured_true(effect):
+    machine = load_machine("hexapod")
+    hidden = HIDDEN[effect]
+    plan = RunPlan(seed=5, poses=50, noise_mm=0.001, hidden=Hidden(hidden), profile=PROFILE)
+    run = simulate(plan)
+    rows = stack(machine, [parse_run(run_toml(run), points_csv(run), actuators=6)])
+    before, found = fit_effects(rows, []), fit_effects(rows, [effect_named(effect, machine)])
+    assert found.bad == ()
+    assert found.chi2_per_dof == pytest.approx(1.0, abs=0.12)
+    at = len(found.model.free)
+    for unknown, value, sigma in zip(
+        found.model.unknowns[0], found.values[at:], found.sigmas[at:], strict=False
+    ):
+        truth = hidden.get(unknown.name, 0.0)
+        if unknown.name.endswith(".t0"):
+            assert abs(value - truth) < 0.05 * np.ptp(rows.time_s)
+        elif unknown.sigma is None:
+            assert abs(value - truth) < 4.5 * sigma, unknown.name
+    assert before.chi2_per_dof > 2.0
+
+
+@pytest.mark.parametrize("body", ["base", "platform"])
+@pytest.mark.parametrize("axis", ["y", "z"])
+def test_discover_mock_tilted_joint_moves_the_readings_as_predicted(body, axis):
+    """Geometry absorbs nearly all of a tilt, so displacements are compared before any refit."""
+    machine = load_machine("hexapod")
+    name = f"joint-tilt.leg2.{body}.{axis}"
+    plan = RunPlan(seed=5, poses=30, parameters=nominal_parameters(machine_file("hexapod")))
+    plain, tilted = simulate(plan), simulate(replace(plan, hidden=Hidden({name: 2e-3})))
+    rows = stack(machine, [parse_run(run_toml(plain), points_csv(plain), actuators=6)])
+    fitted = fit_effects(rows, [])
+    columns = columns_at(fitted, effect_named("joint-tilt", machine), ((),))
+    index = [unknown.name for unknown in columns.unknowns].index(name)
+    predicted = 2e-3 * columns.columns[0, index]
+    moved = (tilted.xyz - plain.xyz)[plain.layout.reading].T
+    seen = np.einsum("ijn,jn->in", rows.whitener, moved)
+    assert np.sqrt(np.mean(seen**2)) > 0.05
+    np.testing.assert_allclose(predicted, seen, atol=0.02 * np.abs(seen).max())
