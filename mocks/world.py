@@ -120,23 +120,34 @@ class World:
     def smr_in_tracker(self, smr: str, times: Array) -> Array:
         """Where the centre of an SMR really is at ``times`` (N,), tracker frame, (N, 3), mm."""
         place = self.smrs.places[smr]
+        pose = self.pose(times) if place in PLATFORM_NESTS else None
+        return self._smr_at(smr, place, times, pose)
+
+    def all_smrs(self, time: float) -> dict[str, Array]:
+        """Where the centre of every SMR really is at one instant, tracker frame, (3,), mm."""
+        times, places = np.array([time]), self.smrs.places
+        pose = self.pose(times) if set(places.values()) & set(PLATFORM_NESTS) else None
+        return {smr: self._smr_at(smr, place, times, pose)[0] for smr, place in places.items()}
+
+    def nest_in_tracker(self, nest: str, times: Array) -> Array:
+        """Where a nest really is at ``times`` (N,), tracker frame, (N, 3), mm."""
+        return self._nest_at(nest, times, self.pose(times) if nest in PLATFORM_NESTS else None)
+
+    def _smr_at(self, smr: str, place: str, times: Array, pose: Pose | None) -> Array:
         if place == BIRDBATH:
             return np.tile(HOME_REFLECTOR, (times.size, 1))
         if place == HAND:
             return np.tile(HAND_AWAY, (times.size, 1))
-        return self.nest_in_tracker(place, times, self.smrs.centre_off_mm(smr))
+        return self._nest_at(place, times, pose, self.smrs.centre_off_mm(smr))
 
-    def nest_in_tracker(self, nest: str, times: Array, off_mm: float = 0.0) -> Array:
-        """Where a nest really is at ``times`` (N,), tracker frame, (N, 3), mm."""
-        up = np.array([0.0, 0.0, off_mm])
-        if nest in PLATFORM_NESTS:
-            pose = self.pose(times)
-            down = -pose.rotation[:, 2, :]
-            centre = np.asarray(PLATFORM_NESTS[nest]) + up
-            base = pose.points(self.distortions.nest(nest, centre, times, down))
-        else:
-            centre = np.asarray(BASE_NESTS[nest]) + up
-            base = self.distortions.nest(nest, centre, times, np.zeros((times.size, 3)))
+    def _nest_at(self, nest: str, times: Array, pose: Pose | None, off_mm: float = 0.0) -> Array:
+        centre = np.array((PLATFORM_NESTS | BASE_NESTS)[nest])
+        centre[2] += off_mm
+        if pose is None or nest in BASE_NESTS:
+            level = np.zeros((times.size, 3))
+            return self._to_tracker(self.distortions.nest(nest, centre, times, level), times)
+        down = -pose.rotation[:, 2, :]
+        base = pose.points(self.distortions.nest(nest, centre, times, down))
         return self._to_tracker(base, times)
 
     def _to_tracker(self, base: Array, times: Array) -> Array:

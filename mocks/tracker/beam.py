@@ -32,10 +32,8 @@ class Beam:
         if self.interrupted:
             return False
         along = self.aim / np.linalg.norm(self.aim)
-        now = np.array([self._world.clock.now()])
         nearest, best = None, self.radius_mm if radius_mm is None else radius_mm
-        for smr in self._world.smrs.places:
-            point = self._world.smr_in_tracker(smr, now)[0]
+        for smr, point in self._world.all_smrs(self._world.clock.now()).items():
             off = float(np.linalg.norm(point - (point @ along) * along))
             if point @ along > 0.0 and off <= best:
                 nearest, best = smr, off
