@@ -20,25 +20,30 @@ HOME_REFLECTOR = (0.0, 180.0, -60.0)
 """Birdbath, tracker frame, mm."""
 
 DEFAULT_DRIFT_DURATION_S = 3600.0
+BEARING_SPREAD_RAD = float(np.radians(6.0))
 
 
 class Station:
     """The base frame in the tracker frame: p_tracker = R p_base + t, drawn by ``seed``.
 
-    The tracker stands 1.2 to 1.4 m away, looks down on the machine by 0.42 m, at any azimuth,
-    levelled to some milliradians.
+    The tracker stands 1.2 to 1.4 m away, looks down on the machine by 0.42 m, levelled to some
+    milliradians. It is put where an operator would put it: between two nests of the platform, so
+    that no SMR hides another within the 20 deg by which the platform turns.
     """
 
     def __init__(self, seed: int) -> None:
         rng = np.random.default_rng([seed, 2])
-        azimuth = rng.uniform(-np.pi, np.pi)
+        side = rng.integers(6) * np.pi / 3.0 + np.pi / 6.0
+        bearing = side + rng.uniform(-1.0, 1.0) * BEARING_SPREAD_RAD
+        yaw = rng.uniform(-np.pi, np.pi)
+        azimuth = bearing + yaw + np.pi
         distance = rng.uniform(1220.0, 1330.0)
         height = rng.uniform(-450.0, -390.0)
         self.translation = np.array(
             [distance * np.cos(azimuth), distance * np.sin(azimuth), height]
         )
         rx, ry = rng.normal(0.0, 0.004, 2)
-        self.rotation = rotation_from_rpy(rx, ry, rng.uniform(-np.pi, np.pi))
+        self.rotation = rotation_from_rpy(rx, ry, yaw)
 
     def frame(self) -> list[float]:
         """x, y, z (mm), rx, ry, rz (rad) of the base frame in the tracker frame."""

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from mocks.clock import ManualClock
-from mocks.physics.hexapod import Array, rotation_from_vector
+from mocks.physics.hexapod import Array, rotation_from_rpy, rotation_from_vector
 from mocks.physics.hidden import Hidden
+from mocks.physics.room import PLATFORM_NESTS
+from mocks.physics.room import Station as TrackerStation
 from mocks.physics.truth import nominal_parameters
 from mocks.tracker.sensor import Sensor, refraction_ppm
 from mocks.world import World, WorldPlan
@@ -277,3 +279,18 @@ def test_true_parameters_may_be_given() -> None:
     w = World(ManualClock(), WorldPlan(parameters=nominal))
     pose = w.pose(np.zeros(1))
     assert pose.position[0] == pytest.approx([0.0, 0.0, 220.0], abs=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_smr_hides_another_from_the_tracker(seed: int) -> None:
+    """Sights of two nests stay apart over the turns of the platform's workspace."""
+    station = TrackerStation(seed)
+    tracker = -station.rotation.T @ station.translation
+    turns = np.radians(np.array(np.meshgrid([-9, 0, 9], [-9, 0, 9], [-20, 0, 20]))).reshape(3, -1)
+    for rx, ry, rz in turns.T:
+        R = rotation_from_rpy(rx, ry, rz)
+        nests = [R @ np.array(n) + [0.0, 0.0, 220.0] for n in PLATFORM_NESTS.values()]
+        for i, j in ((0, 1), (0, 2), (1, 2)):
+            sight = (nests[i] - tracker) / np.linalg.norm(nests[i] - tracker)
+            apart = nests[j] - nests[i]
+            assert np.linalg.norm(apart - (apart @ sight) * sight) > 8.0
