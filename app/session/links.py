@@ -16,6 +16,7 @@ async def open_controller(site: Site) -> MotionController:
         machine=site.machine.name,
         node_id=settings["controller_node"],
         serial=site.controller.serial or None,
+        limits={a.name: a.limits for a in site.machine.actuators},
     )
 
 
