@@ -1,0 +1,122 @@
+"""See where the model fails: residuals against everything, the loudest first
+
+The residual of the fit is asked whether it depends on any state variable of the readings.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from app import answer
+from app.analysis import load_refitter, model_options
+from app.compare_charts import write_charts
+from calib.discover.compare_report import compare_report
+from calib.discover.run_compare import compare_fit
+from calib.discover.run_discovery import SEED
+
+SHOWN = 6
+WIDTH = 13
+
+
+@click.command()
+@click.argument("runs", nargs=-1, required=True, metavar="RUN...")
+@model_options
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Draw figures (structure, workspace, actuators) into this folder.",
+)
+@answer.json_option
+def command(
+    runs: tuple[str, ...],
+    add: tuple[str, ...],
+    model: Path | None,
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Compare the fitted model with the readings of RUN...
+
+    Repeatability first: what does not repeat, no effect can explain. Then what the residual
+    depends on, the variable with the most structure first, and the actuators and poses that are
+    off. Nothing is written but the figures asked for with --out.
+    """
+    refit, begin = load_refitter(runs, add, model)
+    found = compare_fit(refit.fit(begin), np.random.default_rng(SEED))
+    if out is not None:
+        for path in write_charts(found, out):
+            answer.say(f"drawn {path}")
+    report = compare_report(found)
+    answer.show(report, as_json, words(report))
+
+
+def words(report: dict[str, Any]) -> str:
+    """Say a comparison to a person."""
+    model = "baseline" + "".join(f" + {name}" for name in report["effects"])
+    lines = [
+        f"{report['readings']} readings; model: {model}",
+        f"RMS {report['rms_um']:.2f} um (perfect model {report['noise_floor_um']:.2f} um), "
+        f"chi-square per degree of freedom {report['chi2_per_dof']:.3f}",
+        "",
+        _repeats("repeats of poses", report["repeatability"]),
+        _repeats("reference nests", report["reference_repeatability"]),
+        "",
+        "What the residual depends on (p pays for having looked at all of them):",
+        answer.table(
+            ("variable", "p", "explains", "shows in", "period"),
+            [_row(one) for one in report["structure"] if one["significant"]][:SHOWN]
+            or [_row(one) for one in report["structure"]][:3],
+        ),
+    ]
+    for one in [one for one in report["structure"] if one["significant"]][:2]:
+        lines += ["", *_picture(one)]
+    for one in report["together"]:
+        if one["significant"]:
+            how = "poses err as a whole" if one["channel"] == "pose" else "neighbours err alike"
+            lines += ["", f"{how} ({one['channel']}, p = {one['p_value']:.2g})"]
+    if report["actuators"]:
+        lines += ["", "Residual in the actuators, RMS:"]
+        lines.append(
+            "  "
+            + ", ".join(f"{a['actuator']} {a['rms']:.2f} {a['unit']}" for a in report["actuators"])
+        )
+    for bad in report["bad_readings"]:
+        lines.append(f"excluded: line {bad['line']}: {bad['why']}")
+    return "\n".join([*lines, "", report["advice"]])
+
+
+def _repeats(what: str, repeats: dict[str, Any] | None) -> str:
+    if repeats is None:
+        return f"{what}: none, so nothing is known of repeatability"
+    return (
+        f"{what}: scatter {repeats['times_stated_sigma']:.2f} x the stated uncertainty "
+        f"({repeats['dof']} degrees of freedom, p = {repeats['p_value']:.2g}); "
+        f"{100 * repeats['unrepeatable_part_of_misfit']:.0f} % of the misfit does not repeat"
+    )
+
+
+def _row(one: dict[str, Any]) -> tuple[str, ...]:
+    return (
+        one["channel"],
+        f"{one['p_value']:.2g}",
+        f"{one['explains_um']:.2f} um",
+        one["shows_in"],
+        "" if one["period"] is None else f"{one['period']:.4g}",
+    )
+
+
+def _picture(one: dict[str, Any]) -> list[str]:
+    """Draw the bins of a dependence as bars to the left and right of zero."""
+    largest = max((abs(each["value"]) for each in one["bins"]), default=0.0) or 1.0
+    folded = "" if one["period"] is None else f" modulo {one['period']:.4g}"
+    lines = [f"{one['shows_in']} against {one['channel']}{folded}, {one['unit']}:"]
+    for each in one["bins"]:
+        length = round(WIDTH * abs(each["value"]) / largest)
+        left = ("#" * length if each["value"] < 0 else "").rjust(WIDTH)
+        right = ("#" * length if each["value"] > 0 else "").ljust(WIDTH)
+        span = f"{each['from']:.4g}"
+        if each["to"] != each["from"]:
+            span += f" .. {each['to']:.4g}"
+        lines.append(f"  {span:>22}  {left}|{right} {each['value']:+8.2f} +- {each['sigma']:.2f}")
+    return lines

@@ -1,0 +1,174 @@
+"""Compare the model with a run: repeatability, structure against everything, where, which leg."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib.arrays import Array, BoolArray
+from calib.discover.compare import Speaking, Together, compare_structure
+from calib.discover.repeats import PureError, pure_error
+from calib.discover.run_problem import problem_of, quadratics_of, variables_of
+from calib.discover.structure import Carrier, Variable
+from calib.identify.fitting import Fit
+from calib.mechanism.rigid import rotate
+
+
+@dataclass(frozen=True, eq=False)
+class PoseResidual:
+    """Residuals of M poses, their nests together, as the machine sees them.
+
+    Attributes
+    ----------
+    names : tuple of M str
+    position : (3, M)
+        Platform origin, base frame, mm.
+    shift : (3, M)
+        Mean residual over the nests read at the pose, base frame, mm.
+    extension : (n, M)
+        Error of each actuator that explains the pose's residuals best, in its unit; nan where the
+        readings of a pose cannot tell.
+    q : (n, M)
+        Commanded coordinates.
+    """
+
+    names: tuple[str, ...]
+    position: Array
+    shift: Array
+    extension: Array
+    q: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A model against a run; ``speaking`` has the state variable with the most structure first.
+
+    ``displacement_mm`` is, for each of ``speaking``, the RMS over readings of what depends on it,
+    the share of noise taken off.
+    """
+
+    fit: Fit
+    repeatability: PureError
+    reference_repeatability: PureError
+    speaking: tuple[Speaking, ...]
+    displacement_mm: tuple[float, ...]
+    together: tuple[Together, ...]
+    poses: PoseResidual
+
+
+def compare_fit(fit: Fit, rng: np.random.Generator) -> Comparison:
+    """Compare a fitted model with its accepted readings."""
+    problem = problem_of(fit)
+    speaking, together = compare_structure(
+        problem, [*_of_machine(fit), *_of_reading(fit)], quadratics_of(fit), components=3, rng=rng
+    )
+    platform = fit.model.rows.on_platform
+    return Comparison(
+        fit=fit,
+        repeatability=_repeats(fit, platform),
+        reference_repeatability=_repeats(fit, ~platform),
+        speaking=tuple(speaking),
+        displacement_mm=tuple(_displacement(fit, one) for one in speaking),
+        together=tuple(together),
+        poses=pose_residuals(fit),
+    )
+
+
+def _of_machine(fit: Fit) -> list[Variable]:
+    """State variables of the diagnosis, the pose's coordinates each by its own name."""
+    names = iter(f"pose {name}" for name in ("x", "y", "z", "rx", "ry", "rz"))
+    found = variables_of(fit)
+    return [replace(one, name=next(names)) if one.name == "pose" else one for one in found]
+
+
+def _of_reading(fit: Fit) -> list[Variable]:
+    """Variables of the measurement: nest, range, angles of the tracker, size of the last step."""
+    rows, situation, kept = fit.model.rows, fit.linear.situation, fit.accepted
+    count = fit.readings
+    x, y, z = situation.point[:, kept]
+    points = Carrier("point", _flat(np.swapaxes(rows.whitener, 0, 1)[:, :, kept]))
+    turned = np.moveaxis(situation.frame_rotation, 1, 0)
+    platform = [
+        rotate(situation.rotation, axis[:, None] * np.ones(rows.count)) for axis in np.eye(3)
+    ]
+    in_tracker = [np.einsum("jin,jn->in", turned, one) for one in platform]
+    seats = np.stack([np.einsum("ijn,jn->in", rows.whitener, one) for one in in_tracker])
+    seats = seats * rows.on_platform
+    labels = {name: number for number, name in enumerate(dict.fromkeys(rows.nest_name))}
+    nest = np.array([labels[name] for name in rows.nest_name], dtype=np.float64)[kept]
+    legs = Carrier("legs", _flat(situation.actuator_columns[:, :, kept]))
+    found = [
+        Variable("range", np.tile(np.sqrt(x**2 + y**2 + z**2), 3), (points,)),
+        Variable("azimuth", np.tile(np.unwrap(np.arctan2(y, x)), 3), (points,)),
+        Variable("elevation", np.tile(np.arctan2(z, np.hypot(x, y)), 3), (points,)),
+        Variable(
+            "nest", np.tile(nest, 3), (Carrier("seat", _flat(seats[:, :, kept])),), ("levels",)
+        ),
+    ]
+    if np.any(rows.step):
+        found.append(Variable("step", np.tile(rows.step[:, kept], (1, 3)), (legs,)))
+    return [one for one in found if one.values.shape[-1] == 3 * count]
+
+
+def _flat(columns: Array) -> Array:
+    """(c, 3, A) -> (c, 3 A)."""
+    return np.ascontiguousarray(columns.reshape(columns.shape[0], -1))
+
+
+def _repeats(fit: Fit, which: BoolArray) -> PureError:
+    """Repeats of the same pose, nest and direction of approach (reference nests: of the nest)."""
+    rows = fit.model.rows
+    states: list[object] = []
+    for row in np.flatnonzero(fit.accepted):
+        state = (int(rows.run[row]), rows.pose_name[row], rows.nest_name[row])
+        states.append((state, rows.direction[:, row].tobytes()) if which[row] else None)
+    if not which[fit.accepted].any():
+        return PureError(0, float("nan"), float("nan"), 0.0)
+    if not fit.model.rows.on_platform[np.flatnonzero(which)[0]]:
+        states = [state[0] if isinstance(state, tuple) else None for state in states]
+    whitened = fit.linear.whitened[:, fit.accepted]
+    return pure_error(whitened, states, fit.dof)
+
+
+def _displacement(fit: Fit, speaking: Speaking) -> float:
+    """RMS in mm over readings of what a variable explains, less noise's share (dof of chi2)."""
+    factors = np.linalg.inv(np.moveaxis(fit.model.rows.whitener[:, :, fit.accepted], -1, 0))
+    whitened = speaking.fitted.reshape(3, -1)
+    moved = np.einsum("nij,jn->in", factors, whitened)
+    share = max(1.0 - speaking.dof / max(speaking.chi2_fall, 1e-9), 0.0)
+    return float(np.sqrt(share * np.mean(np.sum(moved**2, axis=0))))
+
+
+def pose_residuals(fit: Fit) -> PoseResidual:
+    """Residuals gathered by pose, in the base frame and in the actuators."""
+    rows, situation = fit.model.rows, fit.linear.situation
+    poses = _gathered(fit)
+    columns = situation.actuator_columns
+    n = columns.shape[0]
+    base = np.einsum("jin,jn->in", situation.frame_rotation, fit.linear.residual)
+    extension = np.full((n, len(poses)), np.nan)
+    shift = np.zeros((3, len(poses)))
+    for number, members in enumerate(poses):
+        shift[:, number] = base[:, members].mean(axis=1)
+        own = columns[:, :, members].reshape(n, -1)
+        if own.shape[1] >= n and np.linalg.cond(own @ own.T) < 1e10:
+            whitened = fit.linear.whitened[:, members].reshape(-1)
+            extension[:, number] = np.linalg.solve(own @ own.T, own @ whitened)
+    first = [members[0] for members in poses]
+    return PoseResidual(
+        names=tuple(rows.pose_name[row] for row in first),
+        position=situation.position[:, first],
+        shift=shift,
+        extension=extension,
+        q=rows.q[:, first],
+    )
+
+
+def _gathered(fit: Fit) -> Sequence[list[int]]:
+    """Accepted platform readings of each pose: same run, label and commanded coordinates."""
+    rows = fit.model.rows
+    poses: dict[tuple[int, str, bytes], list[int]] = {}
+    for row in np.flatnonzero(fit.accepted & rows.on_platform):
+        key = (int(rows.run[row]), rows.pose_name[row], rows.q[:, row].tobytes())
+        poses.setdefault(key, []).append(int(row))
+    return list(poses.values())
