@@ -16,6 +16,9 @@ from app.answer import interactive
 from app.session import events as ev
 from app.session.session import Outcome, Session
 
+_OFTEN = {"read", "move", "truth", "home"}
+"""Kinds of steps that are too many to be told one by one."""
+
 
 class ConsoleFace:
     """Watches a session's events and talks to the person at the terminal."""
@@ -109,7 +112,7 @@ def _words(event: ev.Event) -> str:
             return f"going on: {why}"
         case ev.ReadingRejected(pose_label=pose, nest=nest, why=why):
             return f"reading of nest {nest} at pose {pose or 'home'} set aside: {why}"
-        case ev.StepDone(summary=summary, step=step) if "-read-" not in step:
+        case ev.StepDone(summary=summary, step=step) if not _OFTEN & set(step.split("-")):
             return f"  {step}: {summary}"
         case ev.GateChecked(passed=passed, says=says):
             return f"  {'passed ' if passed else 'REFUSED'} {says}"
