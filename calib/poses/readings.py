@@ -46,12 +46,11 @@ class PoseNoise:
     @property
     def says(self) -> str:
         """What is read, in words."""
-        turn = (
-            f", +-{np.rad2deg(self.angle_sigma) * 1e3:.3g} mdeg"
-            if self.angle_sigma is not None
-            else ", no orientation"
-        )
-        return f"whole poses, +-{self.position_sigma * 1e3:.3g} um{turn} (1 sigma)"
+        position = f"+-{self.position_sigma * 1e3:.3g} um"
+        if self.angle_sigma is None:
+            return f"positions, {position} per axis (1 sigma)"
+        turn = np.rad2deg(self.angle_sigma) * 1e3
+        return f"whole poses, {position}, +-{turn:.3g} mdeg per axis (1 sigma)"
 
     @property
     def frame_free(self) -> bool:

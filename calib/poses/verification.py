@@ -5,7 +5,7 @@ orientations at each: 216 poses. Their Table 3 is no box in which that is possib
 shrunk about its centre until every pose is reachable, and what was found is stated.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 
@@ -15,10 +15,25 @@ from calib.arrays import Array
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import Poses
-from calib.poses.reach import PoseSet, reachable, rounded, solve_poses, workspace_box
+from calib.mechanism.solve import home_configuration
+from calib.mechanism.task import task_values
+from calib.poses.reach import (
+    PoseSet,
+    reachable,
+    rounded,
+    sample_poses,
+    solve_poses,
+    workspace_box,
+)
 
 STEPS = 10
 """Halvings of the box's scale: it is found to a thousandth."""
+ELSEWHERE = 1.1
+"""How much larger the grid must become to leave the middle of the workspace."""
+POOR = 0.3
+"""Scale above which nobody looks for a better centre."""
+SAMPLES, SEED = 200, 1
+"""Reachable poses whose mean is tried as a centre; always the same."""
 SPARE = 0.02
 """Part of each stroke kept free at its ends: a calibrated machine needs other q for the grid."""
 
@@ -103,43 +118,65 @@ def verification_poses(machine: Machine) -> VerificationGrid:
     """27 nodes x 8 orientations (216 poses) for a hexapod; fewer coordinates give fewer poses.
 
     The whole grid is scaled about the centre of the machine file's workspace by the largest
-    factor, to a thousandth, at which all poses are reachable.
+    factor, to a thousandth, at which all poses are reachable. Where the workspace reaches far
+    into nothing (a tripod's box), the grid stands around the home pose or around the middle of
+    what can be reached instead, if it becomes larger there.
 
     Raises
     ------
     BadInput
-        If not even the centre of the workspace can be reached.
+        If not even the centre can be reached.
     """
     low, high = workspace_box(machine)
     labels, unit = unit_grid(machine)
-    middle, half = 0.5 * (low + high)[:, None], 0.5 * (high - low)[:, None]
-
-    def grid(scale: float) -> PoseSet:
-        return solve_poses(machine, rounded(machine, middle + scale * half * unit))
-
-    def fits(scale: float) -> bool:
-        found = grid(scale)
-        low, high = machine.q_limits.T[:, :, None]
-        spare = SPARE * (high - low)
-        inside = np.all((found.q >= low + spare) & (found.q <= high - spare))
-        return bool(inside and np.all(reachable(machine, found.configuration)))
-
-    good, bad = 0.0, 1.0
-    if fits(1.0):
-        good = 1.0
-    elif not fits(0.0):
+    half = 0.5 * (high - low)
+    best, centre = 0.0, 0.5 * (low + high)
+    for candidate in _centres(machine):
+        room = np.min(np.minimum(candidate - low, high - candidate) / half)
+        scale = _largest(machine, candidate, half, unit, float(np.clip(room, 0.0, 1.0)))
+        if scale > (ELSEWHERE * best if best else 0.0):
+            best, centre = scale, candidate
+        if best > POOR:
+            break
+    if best == 0.0:
         raise BadInput(
             "the centre of the workspace cannot be reached",
             place=machine.source,
             remedy="Move [workspace] to where the machine can go.",
         )
-    for _ in range(STEPS if good == 0.0 else 0):
-        between = 0.5 * (good + bad)
-        good, bad = (between, bad) if fits(between) else (good, between)
-    scale = np.floor(good * 1000.0) / 1000.0
-    pose_set = grid(scale)
+    pose_set = _grid(machine, centre, half, unit, best)
     box = {
         name: (float(pose_set.task[i].min()), float(pose_set.task[i].max()))
         for i, name in enumerate(machine.task.coordinates)
     }
-    return VerificationGrid(tuple(labels), pose_set, float(scale), box)
+    return VerificationGrid(tuple(labels), pose_set, best, box)
+
+
+def _centres(machine: Machine) -> Iterator[Array]:
+    """Middle of the workspace, home, and the middle of what can be reached."""
+    low, high = workspace_box(machine)
+    yield 0.5 * (low + high)
+    home = home_configuration(machine).poses
+    yield np.clip(task_values(machine.task, home)[:, 0], low, high)
+    some = sample_poses(machine, SAMPLES, np.random.default_rng(SEED)).task
+    yield rounded(machine, some.mean(axis=1)[:, None])[:, 0]
+
+
+def _grid(machine: Machine, centre: Array, half: Array, unit: Array, scale: float) -> PoseSet:
+    return solve_poses(machine, rounded(machine, centre[:, None] + scale * half[:, None] * unit))
+
+
+def _largest(machine: Machine, centre: Array, half: Array, unit: Array, room: float) -> float:
+    """Largest scale up to ``room`` at which the whole grid is reachable; 0 if none is."""
+
+    def fits(scale: float) -> bool:
+        found = _grid(machine, centre, half, unit, scale)
+        return bool(np.all(reachable(machine, found.configuration)))
+
+    if fits(room):
+        return room
+    good, bad = 0.0, room
+    for _ in range(STEPS):
+        between = 0.5 * (good + bad)
+        good, bad = (between, bad) if fits(between) else (good, between)
+    return float(np.floor(good * 1000.0) / 1000.0)
