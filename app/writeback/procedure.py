@@ -9,7 +9,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from app.errors import GateRefused
+from app.errors import GateRefused, StoppedByOperator
 from app.fit_file import SavedFit
 from app.session.events import Stage, WriteBackStage
 from app.session.known import Held, Snapshot, compare_with_known
@@ -22,7 +22,7 @@ from app.writeback.gates import Gates, gates_of_check, gates_of_proposal, refuse
 from app.writeback.proposal import Proposal, propose
 from app.writeback.transfer import keep, prove, snapshots_of, write_volatile
 from calib.poses import verification_poses
-from drivers.errors import DeviceError, ParameterError
+from drivers.errors import DeviceError, ParameterError, Refused
 
 CHECK_POSES = 8
 Confirm = Callable[[Proposal, Summary, Summary], Awaitable[bool]]
@@ -68,6 +68,8 @@ class WriteBack:
     poses: Mapping[str, Pose] = field(default_factory=dict)
     running: Session | None = None
     """The session that measures check poses at this moment."""
+    _stored: bool = False
+    _stopping: bool = False
 
     async def propose(self) -> tuple[Held, Proposal]:
         """Read the controller, compare with the fit, and judge; nothing is written.
@@ -121,6 +123,7 @@ class WriteBack:
             if not await self.confirm(proposal, before.measured, after.measured):
                 raise GateRefused("the operator did not confirm")
             self._stage("store", "into memory that survives a power cycle")
+            self._stored = True
             kept_set = await keep(self.station, wanted)
             self._stage("reload", "loaded again and read back bit for bit")
         except (Exception, asyncio.CancelledError) as error:
@@ -135,6 +138,7 @@ class WriteBack:
 
     async def stop(self) -> None:
         """Stop a measurement of check poses; :meth:`run` then restores and ends."""
+        self._stopping = True
         if self.running is not None:
             await self.running.stop()
 
@@ -167,9 +171,10 @@ class WriteBack:
 
     async def _restore(self, snapshot: Snapshot, why: BaseException) -> None:
         """Bring the earlier set back after a failure; a second failure latches "unknown"."""
+        self._stopping = False
         self._stage("restore", f"set {snapshot.number}, because: {why or 'stopped'}")
         try:
-            await asyncio.shield(_put_back(self.station, snapshot))
+            await asyncio.shield(_put_back(self.station, snapshot, stored=self._stored))
         except (DeviceError, OSError) as again:
             reason = f"restoring set {snapshot.number} failed: {again}"
             snapshots_of(self.station).latch_unknown(reason)
@@ -183,14 +188,27 @@ class WriteBack:
         self._stage("restored", f"set {snapshot.number} is back, read back bit for bit")
 
     def _stage(self, stage: Stage, says: str) -> None:
+        """Tell where we are, unless the operator wants to stop here."""
+        if self._stopping:
+            raise StoppedByOperator(f'stopped before "{stage}"')
         self.station.observers.tell(WriteBackStage(stage, says))
 
 
-async def _put_back(station: Station, snapshot: Snapshot) -> None:
-    """Write a snapshot for good: what failed may have come after the new set was stored."""
+async def _put_back(station: Station, snapshot: Snapshot, *, stored: bool) -> None:
+    """Write a snapshot back; for good as well, if the new set may have been stored.
+
+    A controller that refuses to store has perhaps refused the new set, too: then what it has
+    stored is loaded, and must be the snapshot.
+    """
     await station.safe_stop()
     await write_volatile(station, snapshot.values)
-    await keep(station, snapshot.values)
+    if not stored:
+        return
+    try:
+        await keep(station, snapshot.values)
+    except Refused:
+        await station.controller.reload_parameters()
+        await prove(station, snapshot.values, "as it is stored")
 
 
 async def undo(station: Station, snapshot: Snapshot, why: str) -> Snapshot:

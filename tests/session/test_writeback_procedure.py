@@ -1,5 +1,6 @@
 """Write-back through the wires: kept when all is well, put back when anything is not."""
 
+import asyncio
 from collections.abc import Callable
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 from session_mock import POSES, Heard, Mock
 
-from app.errors import GateRefused
+from app.errors import GateRefused, StoppedByOperator
 from app.fit_file import Estimate, SavedFit, read_fit
 from app.model_files import write_model
 from app.run_files import read_run
@@ -123,18 +124,13 @@ async def test_a_refused_store_restores_the_snapshot(
     station = Station(mock.site)
     station.observers.watch(heard)
     mock.hands("fault", name="store-refused")
-
-    def allow(event: ev.Event) -> None:
-        if isinstance(event, ev.WriteBackStage) and event.stage == "restore":
-            mock.hands("clear")
-
-    station.observers.watch(allow)
     await station.connect()
     found = small_change(station, by=-1e-3)
     gates = Gates.with_limits({"gain": 100.0, "check-peak": 1e6, "check-rms": 1.5})
     try:
-        with pytest.raises(DeviceError):
+        with pytest.raises(DeviceError, match="stor"):
             await WriteBack(station, found, gates, tmp_path, yes, True, CHECK).run()
+        assert heard.of(ev.WriteBackStage)[-1].stage == "restored"
         held = await compare_with_known(station.site, station.controller)
     finally:
         await station.close()
@@ -220,3 +216,29 @@ async def test_what_the_controller_holds_can_be_accepted_knowingly(
     finally:
         await station.close()
     assert held.values["leg2.B_x"] == -46.5
+
+
+async def test_a_stop_during_the_check_poses_puts_everything_back(
+    mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3", scale=100)
+    station = Station(mock.site)
+    station.observers.watch(heard)
+    await station.connect()
+    working = job(station, small_change(station), tmp_path)
+    stops: list[asyncio.Task[None]] = []
+
+    def stop(event: ev.Event) -> None:
+        written = any(stage.stage == "read-back" for stage in heard.of(ev.WriteBackStage))
+        if written and isinstance(event, ev.PoseCommanded) and not stops:
+            stops.append(asyncio.create_task(working.stop()))
+
+    station.observers.watch(stop)
+    try:
+        with pytest.raises(StoppedByOperator):
+            await working.run()
+        held = await compare_with_known(station.site, station.controller)
+    finally:
+        await station.close()
+    assert held.values["leg1.L0"] == 230.715
+    assert heard.of(ev.WriteBackStage)[-1].stage == "restored"
