@@ -171,7 +171,10 @@ def _largest(machine: Machine, centre: Array, half: Array, unit: Array, room: fl
 
     def fits(scale: float) -> bool:
         found = _grid(machine, centre, half, unit, scale)
-        return bool(np.all(reachable(machine, found.configuration)))
+        low, high = machine.q_limits.T[:, :, None]
+        spare = SPARE * (high - low)
+        inside = np.all((found.q >= low + spare) & (found.q <= high - spare))
+        return bool(inside and np.all(reachable(machine, found.configuration)))
 
     if fits(room):
         return room
