@@ -165,10 +165,15 @@ def main() -> None:
     parser.add_argument("--null", type=int, default=400)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--only", choices=("single", "several", "unknown"))
     parser.add_argument("--page", type=Path)
     options = parser.parse_args()
     begin = time.perf_counter()
-    cases = draw_cases(options.cases, options.seed, POSE_SETS)
+    cases = [
+        case
+        for case in draw_cases(options.cases, options.seed, POSE_SETS)
+        if options.only is None or options.only == case.kind
+    ]
     nulls = [
         Case(500_000 + 1000 * options.seed + k, (), (), POSE_SETS[k % len(POSE_SETS)])
         for k in range(options.null)

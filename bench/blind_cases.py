@@ -27,6 +27,13 @@ class Case:
     poses: str
     unknown: bool = False
 
+    @property
+    def kind(self) -> str:
+        """none, single, several or unknown."""
+        if self.unknown:
+            return "unknown"
+        return ("none", "single", "several")[min(len(self.effects), 2)]
+
 
 def _legs(stem: str, rng: np.random.Generator) -> Table:
     """One leg, or all of them, with equal probability."""

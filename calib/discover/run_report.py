@@ -16,6 +16,7 @@ from calib.identify.fitting import Fit
 from calib.identify.report import bad_readings, quality
 
 SMALLEST_P = 1e-300
+FEW_POSES = 15
 
 
 def diagnosis_report(found: RunDiagnosis) -> dict[str, Any]:
@@ -141,6 +142,10 @@ def advice(found: RunDiagnosis) -> str:
     diagnosis = found.diagnosis
     bad = len(found.fit.bad)
     excluded = f" {_readings(bad)} excluded: see bad_readings." if bad else ""
+    rows = found.fit.model.rows
+    poses = len({name for name, on in zip(rows.pose_name, rows.on_platform, strict=True) if on})
+    if poses < FEW_POSES:
+        excluded += f" With {poses} poses only large effects would show: measure more."
     if diagnosis.adequate:
         return f"Nothing is missing: the model explains the readings to their noise.{excluded}"
     best = diagnosis.best

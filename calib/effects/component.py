@@ -142,8 +142,11 @@ class Effect(ABC):
         for name in self.channels:
             if name not in rows.channels:
                 return f"the run has no column {name}"
-            if not np.isfinite(rows.channels[name][rows.on_platform]).any():
+            values = rows.channels[name][rows.on_platform & np.isfinite(rows.channels[name])]
+            if values.size == 0:
                 return f"the column {name} is empty"
+            if name.endswith("_C") and not -40.0 < float(np.median(values)) < 60.0:
+                return f"{name} reads {np.median(values):.4g}, which is no room in deg C"
         return ""
 
     @abstractmethod

@@ -25,6 +25,8 @@ from calib.mechanism.solve import forward
 from calib.model.prediction import Linearised, Model, State
 
 MAX_STEPS = 30
+MAJORITY = 0.3
+"""Least part of a run's readings that must stand where the machine's nests can be."""
 TOLERANCE = 1e-6
 """Steps end when the predicted fall of chi-square is below this, or below 1e-9 of it."""
 
@@ -234,7 +236,7 @@ def _aligned_robustly(
     for run in range(model.frames):
         here = np.flatnonzero((rows.run == run) & allowed)
         R, t, inside = robust_align(base[:, here], rows.position[:, here], slack[here])
-        if inside.sum() < max(3, 0.5 * here.size):
+        if inside.sum() < max(6, MAJORITY * here.size) and inside.sum() < here.size:
             raise BadInput(
                 f"only {inside.sum()} of {here.size} readings are where a nest can be",
                 place=rows.runs[run].source,
