@@ -8,11 +8,14 @@ called for beside the others: one that a later effect has made superfluous is ta
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from calib.discover.diagnosis import Diagnosis
+from calib.discover.diagnosis import ALPHA, Diagnosis
 
 MOST_STEPS = 8
 SLACK = 1e-6
 """Relative rise of the hold-out error that counts as none (rounding of a refit)."""
+
+BY_CHANCE = 0.02
+"""Relative change of the hold-out error by an unknown that is of no use, either way."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +84,7 @@ def discover(
             continue
         groups += [group for group in now.diagnosis.indistinguishable if group not in groups]
         steps.append(Step(tried, added=added))
-    steps += _superfluous(refit, steps[-1].stage, frozenset((*begin, *keep)))
+    steps += _superfluous(refit, steps, frozenset((*begin, *keep)))
     last = steps[-1].stage.effects
     here = [group for group in groups if set(group) & set(last)]
     return Discovery(tuple(steps), tuple(refused), tuple(here))
@@ -92,22 +95,27 @@ def _next(stage: Stage, refused: Sequence[str]) -> str | None:
     diagnosis = stage.diagnosis
     if diagnosis.unknown_preferred or not diagnosis.explained_by:
         return None
-    called = [name for name in diagnosis.explained_by if name not in refused]
-    return called[0] if called else None
+    if diagnosis.explained_by[0] not in refused:
+        return diagnosis.explained_by[0]
+    significant = [found for found in diagnosis.findings if found.p_value <= ALPHA]
+    return next((found.name for found in significant if found.name not in refused), None)
 
 
 def _superfluous(
-    refit: Callable[[tuple[str, ...]], Stage], stage: Stage, keep: frozenset[str]
+    refit: Callable[[tuple[str, ...]], Stage], taken: Sequence[Step], keep: frozenset[str]
 ) -> list[Step]:
-    """Take out effects, the first added first, that the others have made superfluous."""
+    """Take out effects, the first added first, that the others have made superfluous.
+
+    The hold-out may rise by ``BY_CHANCE``, but not to where it was before the last effect.
+    """
     steps: list[Step] = []
-    for name in stage.effects:
-        now = steps[-1].stage if steps else stage
+    before = taken[-2].stage.holdout if len(taken) > 1 else float("inf")
+    for name in taken[-1].stage.effects:
+        now = steps[-1].stage if steps else taken[-1].stage
         if name in keep or len(now.effects) < 2:
             continue
         without = refit(tuple(other for other in now.effects if other != name))
-        if name in without.diagnosis.explained_by:
-            continue
-        if without.diagnosis.adequate and without.holdout <= now.holdout * (1.0 + SLACK):
+        limit = min(now.holdout * (1.0 + BY_CHANCE), before)
+        if without.diagnosis.adequate and without.holdout <= limit:
             steps.append(Step(without, removed=name))
     return steps
