@@ -205,13 +205,13 @@ async def test_a_tcp_reset_ends_safely_and_resumes(
 async def test_stop_works_during_a_move(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:
-    mock = mock_of("--smrs", "3", scale=4)
+    mock = mock_of("--smrs", "3", scale=6)
     session = begin(mock, tmp_path, heard)
     job = session.start()
 
     def hear(event: ev.Event) -> None:
         if isinstance(event, ev.PoseCommanded) and event.pose_label == "a":
-            asyncio.get_running_loop().call_later(0.1, lambda: stops.append(stop()))
+            asyncio.get_running_loop().call_later(0.02, lambda: stops.append(stop()))
 
     def stop() -> "asyncio.Task[None]":
         stops_at.append(mock.hands("truth")["moving"])
@@ -231,13 +231,13 @@ async def test_stop_works_during_a_move(
 async def test_pause_holds_between_steps_and_skip_leaves_one_out(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:
-    mock = mock_of("--smrs", "3", scale=20)
+    mock = mock_of("--smrs", "3", scale=60)
     session = begin(mock, tmp_path, heard)
     paused = asyncio.Event()
     when(heard, session, "home", lambda: (session.pause(), paused.set()))
     job = session.start()
     await asyncio.wait_for(paused.wait(), 20.0)
-    await asyncio.sleep(1.0)
+    await asyncio.sleep(0.5)
     begun = len(heard.of(ev.StepStarted))
     await asyncio.sleep(0.5)
     assert len(heard.of(ev.StepStarted)) == begun
