@@ -19,7 +19,7 @@ def test_reached_within_what_is_allowed() -> None:
 
 def test_a_smaller_error_is_better_only_where_it_is_an_error() -> None:
     assert compare("T1", "a", 1.0, 0.5, "mm", smaller_is_better=True).verdict == BETTER
-    with pytest.raises(BadInput, match="T1, a: ours 0.5 mm, theirs 1 mm"):
+    with pytest.raises(BadInput, match=r"T1, a: ours 0\.5 mm, theirs 1"):
         compare("T1", "a", 1.0, 0.5, "mm")
 
 
