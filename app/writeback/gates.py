@@ -27,7 +27,7 @@ LIMITS: dict[str, float] = {
     "finite": 0.0,
     "tolerance": 5.0,
     "chi2": 4.0,
-    "holdout": 1.5,
+    "holdout": 2.0,
     "workspace": 0.0,
     "condition": 2.0,
     "uncertainty": 50.0,

@@ -1,0 +1,127 @@
+"""Gates and proposals as pure functions: what passes, what is refused, what is never written."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.errors import GateRefused
+from app.fit_file import Estimate, SavedFit
+from app.machine_files import load_machine
+from app.verification import Summary
+from app.writeback.gates import Gates, gates_of_check, gates_of_proposal, refuse_if_any
+from app.writeback.proposal import propose
+from calib.errors import BadInput
+
+MACHINE = load_machine("hexapod")
+NOMINAL = {p.name: p.nominal for p in MACHINE.parameters}
+COMPENSATION = {
+    f"{effect}.leg{i}": 0.0 for effect in ("backlash", "screw-pitch") for i in range(1, 7)
+}
+TABLE = {f"screw-cyclic-table.leg1.{k}": 0.0 for k in ("period", *range(8))}
+HELD = {**NOMINAL, **COMPENSATION, **TABLE}
+GATES = Gates.with_limits({})
+
+
+def made(effects: tuple[str, ...] = (), sigma: float = 5e-3, **changes: float) -> SavedFit:
+    """A fit near nominal, with ``changes`` by parameter name (dots as ``__``)."""
+    values = {**NOMINAL, "leg1.L0": NOMINAL["leg1.L0"] + 0.1}
+    values |= {name.replace("__", "."): value for name, value in changes.items()}
+    estimates = {n: Estimate(n, v, sigma, "mm", True) for n, v in values.items()}
+    quality = {"chi2_per_dof": 1.0, "holdout_rms_um": 9.0, "holdout_floor_um": 9.0}
+    covariance = sigma**2 * np.eye(len(estimates))
+    return SavedFit("made.toml", "hexapod", effects, estimates, quality, covariance, True)
+
+
+def failed(fit: SavedFit, gates: Gates = GATES) -> list[str]:
+    checked = gates_of_proposal(gates, MACHINE, fit, propose(MACHINE, fit, HELD), HELD)
+    return [gate.gate for gate in checked if not gate.passed]
+
+
+def test_a_sane_fit_passes_every_gate() -> None:
+    assert failed(made()) == []
+
+
+@pytest.mark.parametrize(
+    ("fit", "gate"),
+    [
+        (made(leg3__B_x=float("nan")), "finite"),
+        (made(leg3__B_x=NOMINAL["leg3.B_x"] + 2.0), "tolerance"),
+        (replace(made(), quality={**made().quality, "chi2_per_dof": 9.0}), "chi2"),
+        (replace(made(), quality={**made().quality, "holdout_rms_um": 30.0}), "holdout"),
+        (replace(made(), quality={}), "chi2"),
+        (made(sigma=0.2), "uncertainty"),
+        (replace(made(leg1__L0=NOMINAL["leg1.L0"])), "gain"),
+    ],
+)
+def test_what_is_not_sane_is_refused_by_its_gate(fit: SavedFit, gate: str) -> None:
+    assert gate in failed(fit)
+
+
+def test_parameters_that_leave_the_workspace_are_refused() -> None:
+    far = {f"leg{i}__B_z": -8.0 for i in range(1, 7)}
+    assert "workspace" in failed(made(**far), Gates.with_limits({"tolerance": 1e3}))
+
+
+def test_a_limit_can_be_changed_knowingly_but_not_mistyped() -> None:
+    fit = replace(made(), quality={**made().quality, "chi2_per_dof": 9.0})
+    assert failed(fit, Gates.with_limits({"chi2": 10.0})) == []
+    with pytest.raises(BadInput, match="no gate"):
+        Gates.with_limits({"chi": 10.0})
+
+
+def test_effects_of_the_measurement_are_never_written() -> None:
+    fit = made(
+        ("tracker-scale", "backlash", "gravity-sag"),
+        **{"tracker-scale.k": 1e-5, "gravity-sag.c": 1e-4},
+        **{f"backlash.leg{i}": 0.01 for i in range(1, 6)},
+        **{"backlash.leg6": -0.0003},
+    )
+    proposal = propose(MACHINE, fit, HELD)
+    assert set(proposal.left_out) == {"tracker-scale", "gravity-sag"}
+    assert not [n for n in proposal.values if n.startswith(("tracker", "gravity", "frame"))]
+    assert proposal.values["backlash.leg1"] == 0.01
+    assert proposal.values["backlash.leg6"] == 0.0  # lost motion is never negative
+
+
+def test_what_the_controller_compensates_already_is_added_to() -> None:
+    fit = made(("screw-pitch",), **{f"screw-pitch.leg{i}": 1e-4 for i in range(1, 7)})
+    held = {**HELD, "screw-pitch.leg2": 2e-4}
+    values = propose(MACHINE, fit, held).values
+    assert values["screw-pitch.leg1"] == 1e-4
+    assert values["screw-pitch.leg2"] == pytest.approx(3e-4)
+
+
+def test_a_cyclic_error_becomes_a_table() -> None:
+    fit = made(
+        ("screw-cyclic",),
+        **{
+            "screw-cyclic.leg1.sin": 0.01,
+            "screw-cyclic.leg1.cos": 0.0,
+            "screw-cyclic.period": 5.0,
+        },
+    )
+    values = propose(MACHINE, fit, HELD).values
+    assert values["screw-cyclic-table.leg1.period"] == 5.0
+    table = [values[f"screw-cyclic-table.leg1.{k}"] for k in range(8)]
+    assert table == pytest.approx(list(0.01 * np.sin(np.arange(8) * np.pi / 4)))
+
+
+def test_a_fit_of_another_machine_or_of_53_parameters_is_refused() -> None:
+    with pytest.raises(BadInput, match="tripod"):
+        propose(MACHINE, replace(made(), machine="tripod"), HELD)
+    fit = made()
+    less = {n: e for n, e in fit.estimates.items() if n != "leg6.L_P"}
+    with pytest.raises(BadInput, match=r"leg6\.L_P"):
+        propose(MACHINE, replace(fit, estimates=less), HELD)
+
+
+def test_check_poses_must_be_good_and_better() -> None:
+    before = Summary(400.0, 10.0, 300.0, 0.1, 0.01, 0.05)
+    good = Summary(12.0, 2.0, 6.0, 0.005, 0.001, 0.003)
+    assert all(gate.passed for gate in gates_of_check(GATES, before, good, 9.0))
+    worse = replace(before, position_rms_um=310.0)
+    checked = gates_of_check(GATES, before, worse, 9.0)
+    assert [gate.gate for gate in checked if not gate.passed] == ["check-peak", "check-rms"]
+    with pytest.raises(GateRefused, match="check-peak"):
+        refuse_if_any(checked, "measure more")
