@@ -36,7 +36,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mocks.physics.hexapod import rpy_from_rotation
+from mocks.physics.pose import rpy_from_rotation
 from mocks.tracker.instrument import BEAM_BROKEN_STATUS
 from mocks.tracker.server import TrackerServer
 from mocks.world import World

@@ -13,18 +13,10 @@ from mocks.clock import Clock, ScaledClock
 from mocks.faults import FaultSet
 from mocks.physics.climate import Climate
 from mocks.physics.extension import Circumstances, LegErrors, Load, lengths, play_widths
-from mocks.physics.hexapod import (
-    Array,
-    HexapodGeometry,
-    Legs,
-    Pose,
-    forward,
-    geometry,
-    home_pose,
-    rotation_from_vector,
-)
+from mocks.physics.hexapod import HexapodGeometry, Legs, forward, geometry, home_pose
 from mocks.physics.hidden import Hidden
 from mocks.physics.motion import LegMotion
+from mocks.physics.pose import Array, Pose, rotation_from_vector
 from mocks.physics.room import (
     BASE_NESTS,
     HOME_REFLECTOR,

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mocks.physics.hexapod import PHI_B_DEG, Array, HexapodGeometry, Legs, Pose
+from mocks.physics.hexapod import PHI_B_DEG, HexapodGeometry, Legs
 from mocks.physics.hidden import Hidden
+from mocks.physics.pose import Array, Pose
 
 HYSTERESIS_WIDTHS_MM = (0.3, 2.0, 8.0)
 REFERENCE_C = 20.0

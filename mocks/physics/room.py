@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from mocks.physics.hexapod import Array, rotation_from_rpy, rotation_from_vector, rpy_from_rotation
 from mocks.physics.hidden import Hidden
+from mocks.physics.pose import Array, rotation_from_rpy, rotation_from_vector, rpy_from_rotation
 
 BASE_NESTS: dict[str, tuple[float, float, float]] = {
     "b1": (260.0, 0.0, -30.0),

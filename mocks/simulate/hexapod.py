@@ -6,16 +6,9 @@ import numpy as np
 
 from calib.mechanism.description import Machine
 from mocks.physics.extension import Circumstances, LegErrors, play_widths
-from mocks.physics.hexapod import (
-    LEGS,
-    Array,
-    Pose,
-    geometry,
-    home_pose,
-    legs,
-    rotations_from_rpy,
-)
+from mocks.physics.hexapod import LEGS, geometry, home_pose, legs
 from mocks.physics.play import follow
+from mocks.physics.pose import Array, Pose, rotations_from_rpy
 from mocks.physics.truth import nominal_parameters
 from mocks.simulate.layout import HOME, Layout
 from mocks.simulate.plan import RunPlan

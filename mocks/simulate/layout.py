@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mocks.physics.hexapod import Array
+from mocks.physics.pose import Array
 from mocks.physics.room import BASE_NESTS
 from mocks.simulate.plan import RunPlan
 

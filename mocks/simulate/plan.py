@@ -7,8 +7,8 @@ from typing import Literal
 import numpy as np
 
 from mocks.physics.extension import Load
-from mocks.physics.hexapod import Array
 from mocks.physics.hidden import Hidden
+from mocks.physics.pose import Array
 
 Order = Literal["nest-by-nest", "pose-by-pose"]
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mocks.physics.hexapod import Array, Pose
+from mocks.physics.pose import Array, Pose
 from mocks.physics.room import BASE_NESTS, PLATFORM_NESTS, Distortions, Station
 from mocks.physics.signals import Wander, mean_variance
 from mocks.physics.truth import draw_parameters, machine_file

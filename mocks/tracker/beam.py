@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mocks.physics.hexapod import Array
+from mocks.physics.pose import Array
 from mocks.world import World
 
 DEFAULT_RADIUS_MM = 20.0

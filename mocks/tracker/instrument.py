@@ -20,7 +20,7 @@ from drivers.emscon.codes import (
     WeatherMonitor,
 )
 from mocks.clock import ScaledClock
-from mocks.physics.hexapod import Array
+from mocks.physics.pose import Array
 from mocks.tracker.beam import Beam
 from mocks.tracker.measuring import Measuring
 from mocks.tracker.sensor import Sensor

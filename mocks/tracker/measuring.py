@@ -7,7 +7,7 @@ import numpy as np
 
 from drivers.emscon import wire
 from drivers.emscon.codes import Event, MeasurementMode, PacketType, Status
-from mocks.physics.hexapod import Array
+from mocks.physics.pose import Array
 from mocks.tracker.sensor import Dwell
 
 if TYPE_CHECKING:

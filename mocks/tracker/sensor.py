@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mocks.physics.hexapod import Array
+from mocks.physics.pose import Array
 from mocks.physics.signals import Wander, mean_variance
 from mocks.world import World
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from drivers.emscon import wire
 from drivers.emscon.codes import Angle, Coordinates, Pressure, Temperature
-from mocks.physics.hexapod import Array
+from mocks.physics.pose import Array
 
 _PER_MM: dict[int, float] = {0: 1e-3, 1: 1.0, 2: 1e3, 3: 1 / 304.8, 4: 1 / 914.4, 5: 1 / 25.4}
 """m, mm, um, ft, yd, in."""

@@ -4,13 +4,10 @@ import numpy as np
 import pytest
 
 from mocks.physics.extension import Load, axial_forces
-from mocks.physics.hexapod import (
+from mocks.physics.hexapod import forward, geometry, home_pose, legs
+from mocks.physics.pose import (
     Array,
     Pose,
-    forward,
-    geometry,
-    home_pose,
-    legs,
     rotation_from_rpy,
     rotation_from_vector,
     rpy_from_rotation,

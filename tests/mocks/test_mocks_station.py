@@ -59,7 +59,7 @@ def nest_seen(hands: ControlClient, station: dict[str, Any], nest: str) -> np.nd
     """Where a nest is, tracker frame, from the truth."""
     truth = hands("truth", settled=True)
     x, y, z, rx, ry, rz = truth["frame"]
-    from mocks.physics.hexapod import rotation_from_rpy
+    from mocks.physics.pose import rotation_from_rpy
 
     base = np.array(station["site"]["nests"]["base"].get(nest, [0, 0, 0]), dtype=float)
     if nest in station["site"]["nests"]["platform"]:
