@@ -1,7 +1,7 @@
 """Discovery on a run: add the best effect, refit, and go on until nothing more is called for."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -52,10 +52,17 @@ class Refitter:
         return self._fits[names]
 
     def __call__(self, names: tuple[str, ...]) -> RunStage:
-        """Fit and diagnose."""
+        """Fit and diagnose; a model that cannot be fitted predicts nothing and so is refused."""
         if names not in self._stages:
             if self._watch is not None:
                 self._watch(names)
+            try:
+                self.fit(names)
+            except BadInput:
+                before = self._stages.get(names[:-1])
+                if before is None:
+                    raise
+                return replace(before, effects=names, holdout=float("inf"))
             found = diagnose_fit(
                 self.fit(names), tuple(self.effects.values()), np.random.default_rng(self._seed)
             )

@@ -19,7 +19,7 @@ from calib.identify.fitting import Fit
 from calib.mechanism.rigid import rotate, to_euler
 from calib.model.prediction import at_trial, channels_known, whitened_columns
 
-FIELDS = ("extension", "parameters", "nest", "point")
+FIELDS = ("extension", "parameters", "nest", "point", "twist")
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,6 @@
 """What a physical effect is to the model: named unknowns and an analytic signature.
 
-An effect changes one or several of four things, and is linear in its unknowns but for those that
+An effect changes one or several of five things, and is linear in its unknowns but for those that
 it declares nonlinear (a period, a time constant, a moment):
 
     extension of the actuators      (n, N)   mm or rad
@@ -21,9 +21,11 @@ from typing import Literal
 
 import numpy as np
 
-from calib.arrays import Array
+from calib.arrays import Array, IntArray
 from calib.mechanism.description import Machine
+from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.rigid import cross, rotate
+from calib.mechanism.solve import Configuration
 from calib.runs.stack import Rows
 
 Kind = Literal["machine", "measurement"]
@@ -62,6 +64,9 @@ class Situation:
         SMR centre in the base frame and in the tracker frame, mm.
     frame_rotation : (3, 3, N)
         Base frame in the tracker frame.
+    closed, state_of, parameters : Configuration of M, (N,), (P,) or (P, M)
+        The machine closed at its M distinct states, the state of each reading, and the parameters
+        with which it was closed.
     """
 
     rows: Rows
@@ -74,6 +79,9 @@ class Situation:
     base_point: Array
     point: Array
     frame_rotation: Array
+    closed: Configuration
+    state_of: IntArray
+    parameters: Array
 
     @property
     def machine(self) -> Machine:
@@ -89,6 +97,25 @@ class Situation:
         turned = np.stack([rotate(self.frame_rotation, one) for one in moved]) * rows.on_platform
         columns: Array = np.einsum("ijn,ujn->uin", rows.whitener, turned)
         return columns
+
+    def error_twists(self, name: str) -> Array:
+        """Twist (6, N) of the platform per unit of a parameter, hidden error sources included."""
+        machine = self.machine.detailed or self.machine
+        twists: Array = self._detailed[machine.index(name)]
+        return twists[:, self.state_of]
+
+    @cached_property
+    def _detailed(self) -> Array:
+        """Twists (P', 6, M) by every parameter of the machine in detail."""
+        machine = self.machine.detailed
+        if machine is None:
+            answer: Array = pose_jacobians(self.machine, self.closed, self.parameters).parameters
+            return answer
+        held = np.zeros((len(machine.parameters), *self.parameters.shape[1:]))
+        held += machine.nominal.reshape(-1, *[1] * (self.parameters.ndim - 1))
+        held[: self.parameters.shape[0]] = self.parameters
+        detailed: Array = pose_jacobians(machine, self.closed, held).parameters
+        return detailed
 
     @cached_property
     def length(self) -> Array:
@@ -108,6 +135,8 @@ class Signature:
     """(U, 3, N), platform frame"""
     point: Array | None = None
     """(U, 3, N), tracker frame"""
+    twist: Array | None = None
+    """(U, 6, N), base axes, velocity of the platform's origin first"""
 
 
 class Effect(ABC):

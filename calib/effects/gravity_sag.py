@@ -53,8 +53,10 @@ class GravitySag(Effect):
     depends = ("payload_kg",)
 
     def applies(self, machine: Machine) -> bool:
-        """Where each actuator stands in a limb of its own that is not a spring already."""
-        return len(machine.actuators) > 0 and machine.name != "tripod"
+        """Where the actuators yield; a tripod's rods do, by a definition of their own."""
+        detailed = machine.detailed or machine
+        rods = any(parameter.name.endswith(".dh1") for parameter in detailed.parameters)
+        return bool(machine.actuators) and not rods
 
     def unavailable(self, rows: Rows) -> str:
         """Without [load] there is no weight to speak of."""

@@ -180,11 +180,12 @@ class Model:
         """
         _, inverse = self._states
         rows = self.rows
-        closed, parameters, nest = self._settled(state)
+        closed, parameters, nest, twist = self._settled(state)
         jacobians = pose_jacobians(self.machine, closed, parameters)
         rotation = closed.poses.rotation[:, :, inverse]
         arm = rotate(rotation, nest)
-        base = np.where(rows.on_platform, closed.poses.position[:, inverse] + arm, rows.nest)
+        bent = twist[:3] + cross(twist[3:], arm)
+        base = np.where(rows.on_platform, closed.poses.position[:, inverse] + arm + bent, rows.nest)
         turn = state.frame_rotation[:, :, rows.run]
         turned = rotate(turn, base)
         point = turned + state.frame_position[:, rows.run]
@@ -199,6 +200,9 @@ class Model:
             base_point=base,
             point=point,
             frame_rotation=turn,
+            closed=closed,
+            state_of=inverse,
+            parameters=parameters,
         )
         now = replace(state, configuration=closed, situation=situation)
         signatures = self._signatures(now)
@@ -214,16 +218,17 @@ class Model:
         """What the tracker should read (3, N), mm, without derivatives."""
         _, inverse = self._states
         rows = self.rows
-        closed, _, nest = self._settled(state)
+        closed, _, nest, twist = self._settled(state)
         poses = closed.poses
         arm = rotate(poses.rotation[:, :, inverse], nest)
-        base = np.where(rows.on_platform, poses.position[:, inverse] + arm, rows.nest)
+        bent = twist[:3] + cross(twist[3:], arm)
+        base = np.where(rows.on_platform, poses.position[:, inverse] + arm + bent, rows.nest)
         turned = rotate(state.frame_rotation[:, :, rows.run], base)
         point = turned + state.frame_position[:, rows.run]
         return point + _change(self._signatures(state), "point", point)
 
-    def _settled(self, state: State) -> tuple[Configuration, Array, Array]:
-        """Close the machine where its effects and its pose agree; also parameters and nests.
+    def _settled(self, state: State) -> tuple[Configuration, Array, Array, Array]:
+        """Close the machine where its effects and its pose agree; parameters, nests and twists too.
 
         An effect's extension depends on the pose that it changes, weakly: the two are iterated.
         """
@@ -257,9 +262,12 @@ class Model:
                     position=closed.poses.position[:, inverse],
                     rotation=closed.poses.rotation[:, :, inverse],
                     passive=closed.passive[:, inverse],
+                    closed=closed,
+                    parameters=parameters,
                 ),
             )
-        return closed, parameters, rows.nest + _change(signatures, "nest", rows.nest)
+        twist = _change(signatures, "twist", np.zeros((6, rows.count)))
+        return closed, parameters, rows.nest + _change(signatures, "nest", rows.nest), twist
 
     def _closed(
         self, extension: Array, parameters: Array, start: Configuration | None
@@ -368,6 +376,8 @@ def whitened_columns(signature: Signature, situation: Situation) -> Array:
     if signature.parameters is not None:
         twists = _contract(np.nan_to_num(signature.parameters), situation.parameter_twists)
         total = total + _through(lever, twists)
+    if signature.twist is not None:
+        total = total + _through(lever, np.nan_to_num(signature.twist))
     if signature.nest is not None:
         turned = np.stack([rotate(situation.rotation, shape) for shape in signature.nest])
         total = total + _apply_each(combined * rows.on_platform, turned)
