@@ -94,7 +94,7 @@ def _exact_words(found: Identifiability) -> str:
         )
     more = len(found.exact_groups) - SHOWN
     lines += [f"  ... and {more} more groups (--json lists them)"] if more > 0 else []
-    return "Cannot be told apart by any number of such readings:\n" + "\n".join(lines)
+    return "Cannot be told apart at these poses, however often they are read:\n" + "\n".join(lines)
 
 
 def _relation_words(relation: Relation) -> str:

@@ -19,9 +19,10 @@ from calib.analysis.observation import Sights, judge, observe
 from calib.analysis.subsets import compare_subsets, matching
 from calib.arrays import Array
 from calib.mechanism.description import Machine
+from calib.poses.reach import PoseSet, sample_poses
 from calib.poses.readings import HAN_2020, PoseNoise
 
-FRESH = 300
+POSES, FRESH = 60, 300
 NEST_RADIUS = 100.0
 """Radius in mm on which nests are assumed where no site says otherwise."""
 
@@ -35,16 +36,29 @@ NEST_RADIUS = 100.0
     show_default=True,
     help="What is read at each pose: SMR nests, the whole pose, or the platform's origin.",
 )
-@click.option("--nests", "nest_count", default=3, show_default=True, help="Nests that are assumed.")
+@click.option(
+    "--nests",
+    "nest_count",
+    type=click.IntRange(1),
+    default=3,
+    show_default=True,
+    help="Nests that are assumed.",
+)
 @click.option("--site", "site_file", type=click.Path(path_type=Path), help="Nests of a site file.")
 @click.option("--sigma-um", type=float, help="Standard uncertainty of a reading per axis, um.")
 @click.option("--frame-free/--frame-known", default=True, show_default=True, help="Base frame.")
 @click.option("--nests-free/--nests-known", default=False, show_default=True, help="Nest centres.")
 @click.option("--no-base-nests", is_flag=True, help="Nothing on the base is read.")
-@click.option("--poses", default=60, show_default=True, help="Random reachable poses.")
+@click.option(
+    "--poses",
+    type=click.IntRange(1),
+    help="Random reachable poses [60; a pointing machine: every 10 deg].",
+)
 @click.option("--poses-file", type=click.Path(path_type=Path), help="These poses instead.")
 @click.option("--only", default="", help="A choice of parameters to judge: limb?.0dx1,limb5.*")
-@click.option("--seed", default=1, show_default=True, help="Seed of the random poses.")
+@click.option(
+    "--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the random poses."
+)
 @answer.json_option
 def command(
     machine_name: str,
@@ -56,7 +70,7 @@ def command(
     frame_free: bool,
     nests_free: bool,
     no_base_nests: bool,
-    poses: int,
+    poses: int | None,
     poses_file: Path | None,
     only: str,
     seed: int,
@@ -70,11 +84,7 @@ def command(
     """
     machine = chosen_machine(machine_name, closure)
     generator = np.random.default_rng(seed)
-    where = (
-        read_pose_file(poses_file, machine).pose_set
-        if poses_file
-        else workspace_poses(machine, poses, generator)
-    )
+    where = _poses(machine, poses, poses_file, generator)
     fresh = workspace_poses(machine, FRESH, generator)
     sights = _sights(read, nest_count, site_file, sigma_um, frame_free, nests_free, no_base_nests)
     observation = observe(where, sights)
@@ -98,6 +108,16 @@ def command(
     answer.show({**head, **data}, as_json, text)
 
 
+def _poses(
+    machine: Machine, count: int | None, file: Path | None, generator: np.random.Generator
+) -> PoseSet:
+    if file:
+        return read_pose_file(file, machine).pose_set
+    if count is None:
+        return workspace_poses(machine, POSES, generator)
+    return sample_poses(machine, count, generator)
+
+
 def _parameters(machine: Machine) -> list[str]:
     return [p.name for p in machine.parameters]
 
@@ -118,8 +138,6 @@ def _sights(
         site = load_site(site_file)
         platform, base = nest_matrix(site.platform_nests), nest_matrix(site.base_nests)
     else:
-        if nest_count < 1:
-            raise click.BadParameter("at least one nest is read", param_hint="--nests")
         platform, base = _circle(nest_count, NEST_RADIUS), _circle(3, 2.6 * NEST_RADIUS)
     base = base[:, :0] if no_base_nests else base
     if read == "nests":

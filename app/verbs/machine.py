@@ -29,7 +29,13 @@ def command() -> None:
 
 @command.command()
 @machine_options
-@click.option("--seed", default=1, show_default=True, help="Seed of the poses that are tried.")
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=1,
+    show_default=True,
+    help="Seed of the poses that are tried.",
+)
 @answer.json_option
 def check(machine_name: str, closure: str, seed: int, as_json: bool) -> None:
     """Say in words what a machine file describes, or what is wrong with it.

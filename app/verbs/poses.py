@@ -24,7 +24,14 @@ ANGLES = ("rx", "ry", "rz", "tilt", "azimuth")
 @click.command()
 @click.argument("machine_name", metavar="[MACHINE]", default="")
 @click.option("--machine", "machine_option", default="", help="Shipped machine or machine file.")
-@click.option("--n", "count", default=29, show_default=True, help="How many poses to choose.")
+@click.option(
+    "--n",
+    "count",
+    type=click.IntRange(1),
+    default=29,
+    show_default=True,
+    help="How many poses to choose.",
+)
 @click.option(
     "--criterion",
     type=click.Choice(["I", "D"]),
@@ -38,8 +45,16 @@ ANGLES = ("rx", "ry", "rz", "tilt", "azimuth")
 @click.option("--site", "site_file", type=click.Path(path_type=Path), help="Nests of a site file.")
 @click.option("--sigma-um", type=float, help="Standard uncertainty of a reading per axis, um.")
 @click.option("--angle-mdeg", type=float, help="The same of an angle, where poses are read whole.")
-@click.option("--candidates", default=CANDIDATES, show_default=True, help="Reachable candidates.")
-@click.option("--seed", default=1, show_default=True, help="Seed of the candidates.")
+@click.option(
+    "--candidates",
+    type=click.IntRange(1),
+    default=CANDIDATES,
+    show_default=True,
+    help="Reachable candidates.",
+)
+@click.option(
+    "--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the candidates."
+)
 @click.option("--verification", is_flag=True, help="Write the verification grid instead.")
 @click.option("--out", type=click.Path(path_type=Path), help="Write a poses file for measure.")
 @answer.json_option

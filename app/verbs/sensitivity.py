@@ -21,8 +21,16 @@ DEGREE = float(np.deg2rad(1.0))
 @click.option("--each", is_flag=True, help="Every parameter by itself instead of its kind.")
 @click.option("--position-um", type=float, help="Wanted standard deviation of the position, um.")
 @click.option("--orientation-mdeg", type=float, help="The same of the orientation, mdeg.")
-@click.option("--poses", default=500, show_default=True, help="Poses over the workspace.")
-@click.option("--seed", default=1, show_default=True, help="Seed of these poses.")
+@click.option(
+    "--poses",
+    type=click.IntRange(1),
+    default=500,
+    show_default=True,
+    help="Poses over the workspace.",
+)
+@click.option(
+    "--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of these poses."
+)
 @click.option("--figure", type=click.Path(path_type=Path), help="Write bar charts (png, svg, pdf).")
 @answer.json_option
 def command(
