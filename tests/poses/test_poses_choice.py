@@ -3,7 +3,10 @@ import pytest
 
 from app.machine_files import load_machine
 from calib.mechanism.description import Machine
+from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.limits import within_limits
+from calib.mechanism.rigid import pose_difference
+from calib.mechanism.solve import forward
 from calib.poses import PoseSet, sample_poses
 from calib.poses.choose import Candidates, Criterion, exchange, greedy
 from calib.poses.design import design_poses
@@ -147,3 +150,34 @@ def test_prediction_is_what_simulated_fits_show(pool: PoseSet) -> None:
     judge = Judge.over(pool, SIGHTS, known.scale)
     actual = np.sqrt(np.mean(np.einsum("pk,pq,qk->k", error, judge.position, error))) * 1e3
     assert judge.accuracy(C).position_um == pytest.approx(actual, rel=0.02)
+
+
+def test_prediction_holds_for_the_exact_machine(machine: Machine) -> None:
+    # Truth from the priors, whole poses read with Han's noise, damped by the priors, exact
+    # kinematics throughout: position RMS at fresh poses against what the design predicted.
+    generator = np.random.default_rng(30)
+    design = design_poses(machine, HAN_2020, 29, generator, candidates=800, counts=())
+    fresh = sample_poses(machine, 100, generator)
+    s, s_fresh = design.pose_set.configuration.extension, fresh.configuration.extension
+    sigma = np.array([HAN_2020.position_sigma] * 3 + [HAN_2020.angle_sigma or 1.0] * 3)
+    squares = []
+    for _ in range(12):
+        truth = machine.nominal + machine.prior_sigma * generator.standard_normal(54)
+        noise = sigma[:, None] * generator.uniform(-np.sqrt(3.0), np.sqrt(3.0), (6, 29))
+        seen = forward(machine, s, truth).poses
+        found = machine.nominal.copy()
+        for _ in range(4):
+            at = forward(machine, s, found)
+            J = pose_jacobians(machine, at, found).parameters / sigma[:, None]
+            A = (J * machine.prior_sigma[:, None, None]).reshape(54, -1)
+            r = (pose_difference(at.poses, seen) + noise) / sigma[:, None]
+            pull = (machine.nominal - found) / machine.prior_sigma
+            step = np.linalg.solve(A @ A.T + np.eye(54), A @ r.reshape(-1) + pull)
+            found += machine.prior_sigma * step
+        off = (
+            forward(machine, s_fresh, found).poses.position
+            - forward(machine, s_fresh, truth).poses.position
+        )
+        squares.append(np.mean(np.sum(off**2, axis=0)))
+    actual = np.sqrt(np.mean(squares)) * 1e3
+    assert actual == pytest.approx(design.accuracy.position_um, rel=0.2)
