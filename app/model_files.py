@@ -129,6 +129,14 @@ class OwnEffect(Effect):
         """As the operator's effect says."""
         return self._effect.trials(rows)
 
+    def closure(self, machine: Machine, values: Array) -> Machine:
+        """As the operator's effect says."""
+        return self._effect.closure(machine, values)
+
+    def rest(self, rows: Rows) -> Array:
+        """As the operator's effect says."""
+        return self._effect.rest(rows)
+
     def refined(self, rows: Rows, trial: tuple[float, ...]) -> Iterator[tuple[float, ...]]:
         """As the operator's effect says."""
         return self._effect.refined(rows, trial)

@@ -66,7 +66,7 @@ class Situation:
         Base frame in the tracker frame.
     closed, state_of, parameters : Configuration of M, (N,), (P,) or (P, M)
         The machine closed at its M distinct states, the state of each reading, and the parameters
-        with which it was closed.
+        with which it was closed; ``closing`` is the machine that was closed (see Effect.closure).
     """
 
     rows: Rows
@@ -82,6 +82,7 @@ class Situation:
     closed: Configuration
     state_of: IntArray
     parameters: Array
+    closing: Machine
 
     @property
     def machine(self) -> Machine:
@@ -100,16 +101,16 @@ class Situation:
 
     def error_twists(self, name: str) -> Array:
         """Twist (6, N) of the platform per unit of a parameter, hidden error sources included."""
-        machine = self.machine.detailed or self.machine
+        machine = self.closing.detailed or self.closing
         twists: Array = self._detailed[machine.index(name)]
         return twists[:, self.state_of]
 
     @cached_property
     def _detailed(self) -> Array:
         """Twists (P', 6, M) by every parameter of the machine in detail."""
-        machine = self.machine.detailed
+        machine = self.closing.detailed
         if machine is None:
-            answer: Array = pose_jacobians(self.machine, self.closed, self.parameters).parameters
+            answer: Array = pose_jacobians(self.closing, self.closed, self.parameters).parameters
             return answer
         held = np.zeros((len(machine.parameters), *self.parameters.shape[1:]))
         held += machine.nominal.reshape(-1, *[1] * (self.parameters.ndim - 1))
@@ -189,6 +190,14 @@ class Effect(ABC):
     def trials(self, rows: Rows) -> Iterator[tuple[float, ...]]:
         """Values of the nonlinear unknowns to be searched, in the order of the unknowns."""
         yield ()
+
+    def closure(self, machine: Machine, values: Array) -> Machine:
+        """Machine that is closed while the effect is in the model, if not the plain one."""
+        return machine
+
+    def rest(self, rows: Rows) -> Array:
+        """Values (U,) at which the effect adds nothing to what its closure does by itself."""
+        return np.zeros(len(self.unknowns(rows)))
 
     def refined(self, rows: Rows, trial: tuple[float, ...]) -> Iterator[tuple[float, ...]]:
         """Values closer about the best trial, for unknowns that the fit cannot move itself."""

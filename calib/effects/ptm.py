@@ -88,17 +88,21 @@ class Redundancy(Effect):
         for number in _released(rows.machine):
             yield (float(number),)
 
+    def closure(self, machine: Machine, values: Array) -> Machine:
+        """The machine without the constraint: what is linear about it is then its share."""
+        return _without(machine, round(float(values[1])))
+
+    def rest(self, rows: Rows) -> Array:
+        """A share of one is what the released closure does."""
+        return np.array([1.0, 0.0])
+
     def signature(self, situation: Situation, values: Array) -> Signature:
         """From the pose with all constraints to the pose without one, same parameters."""
-        machine, closed = situation.machine, situation.closed
-        free = _without(machine, round(float(values[1])))
-        loose = forward(free, closed.extension, situation.parameters)
-        twist = np.concatenate(
-            [
-                loose.poses.position - closed.poses.position,
-                small_rotation(closed.poses.rotation, loose.poses.rotation),
-            ]
-        )[:, situation.state_of]
+        machine, s, held = situation.machine, situation.closed.extension, situation.parameters
+        tight = forward(machine, s, held).poses
+        loose = forward(_without(machine, round(float(values[1]))), s, held).poses
+        turned = small_rotation(tight.rotation, loose.rotation)
+        twist = np.concatenate([loose.position - tight.position, turned])[:, situation.state_of]
         return Signature(twist=np.stack([twist, np.zeros_like(twist)]))
 
 

@@ -153,12 +153,13 @@ class Model:
     def nominal_configuration(self) -> Configuration:
         """The nominal machine closed at every distinct machine state."""
         first, _ = self._states
-        return self._closed(self.rows.extension[:, first], self.machine.nominal, None)
+        extension = self.rows.extension[:, first]
+        return self._closed(extension, self.machine.nominal, None, self.machine)
 
     def start(self, rotation: Array, position: Array) -> State:
         """Nominal parameters, effects at rest (first trial), frames (3, 3, K), (3, K)."""
         effects = tuple(
-            at_trial(group, next(iter(effect.trials(self.rows))))
+            at_trial(group, next(iter(effect.trials(self.rows)))) + effect.rest(self.rows)
             for effect, group in zip(self.effects, self.unknowns, strict=True)
         )
         nominal = self.machine.nominal.copy()
@@ -181,7 +182,8 @@ class Model:
         _, inverse = self._states
         rows = self.rows
         closed, parameters, nest, twist = self._settled(state)
-        jacobians = pose_jacobians(self.machine, closed, parameters)
+        closing = self._closing(state)
+        jacobians = pose_jacobians(closing, closed, parameters)
         rotation = closed.poses.rotation[:, :, inverse]
         arm = rotate(rotation, nest)
         bent = twist[:3] + cross(twist[3:], arm)
@@ -203,6 +205,7 @@ class Model:
             closed=closed,
             state_of=inverse,
             parameters=parameters,
+            closing=closing,
         )
         now = replace(state, configuration=closed, situation=situation)
         signatures = self._signatures(now)
@@ -248,7 +251,7 @@ class Model:
                 held = np.repeat(state.parameters[:, None], rows.count, axis=1)
                 parameters = (held + _change(signatures, "parameters", held))[:, first]
             extension = (rows.extension + change)[:, first]
-            closed = self._closed(extension, parameters, state.configuration)
+            closed = self._closed(extension, parameters, state.configuration, self._closing(state))
             if not shaped and np.max(np.abs(change - moved), initial=0.0) < SETTLED:
                 break
             if state.situation is None or not signatures:
@@ -269,12 +272,19 @@ class Model:
         twist = _change(signatures, "twist", np.zeros((6, rows.count)))
         return closed, parameters, rows.nest + _change(signatures, "nest", rows.nest), twist
 
+    def _closing(self, state: State) -> Machine:
+        """The machine as the effects let it close."""
+        machine = self.machine
+        for effect, values in zip(self.effects, state.effects, strict=True):
+            machine = effect.closure(machine, values)
+        return machine
+
     def _closed(
-        self, extension: Array, parameters: Array, start: Configuration | None
+        self, extension: Array, parameters: Array, start: Configuration | None, machine: Machine
     ) -> Configuration:
-        if start is not None and start.count != extension.shape[1]:
-            start = None  # of a model with other effects, whose distinct states are others
-        closed = forward(self.machine, extension, parameters, start)
+        if start is not None and not _of_these_states(start, extension, machine):
+            start = None
+        closed = forward(machine, extension, parameters, start)
         if not closed.converged.all():
             state = int(np.argmin(closed.converged))
             row = int(self._states[0][state])
@@ -299,8 +309,10 @@ class Model:
     def _linear(self, state: State) -> list[Array]:
         """Values of every effect with zero in place of its nonlinear unknowns."""
         return [
-            np.where([unknown.nonlinear for unknown in group], 0.0, values)
-            for group, values in zip(self.unknowns, state.effects, strict=True)
+            np.where([u.nonlinear for u in group], 0.0, values - effect.rest(self.rows))
+            for effect, group, values in zip(
+                self.effects, self.unknowns, state.effects, strict=True
+            )
         ]
 
     def _frame_columns(self, turned: Array) -> list[Array]:
@@ -344,6 +356,13 @@ class Model:
         scanned = [unknown.nonlinear for group in self.unknowns for unknown in group]
         deviation[self.free.size : own.size][scanned] = 0.0
         return deviation
+
+
+def _of_these_states(start: Configuration, extension: Array, machine: Machine) -> bool:
+    """Whether a configuration can begin this closure: a model with other effects has others."""
+    like = home_configuration(machine).strain
+    shapes = [strain.shape[:2] for strain in start.strain] == [one.shape[:2] for one in like]
+    return shapes and start.count == extension.shape[1]
 
 
 def at_trial(unknowns: Sequence[Unknown], trial: Sequence[float]) -> Array:
