@@ -59,10 +59,10 @@ class Refitter:
             try:
                 self.fit(names)
             except BadInput:
-                before = self._stages.get(names[:-1])
-                if before is None:
+                if not self._stages:
                     raise
-                return replace(before, effects=names, holdout=float("inf"))
+                first = next(iter(self._stages.values()))
+                return replace(first, effects=names, holdout=float("inf"))
             found = diagnose_fit(
                 self.fit(names), tuple(self.effects.values()), np.random.default_rng(self._seed)
             )
