@@ -69,8 +69,15 @@ def _says(verb: str) -> str:
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 @click.version_option(package_name="pkmcal")
+@click.option("--site", type=click.Path(path_type=Path), help="Open the screens with this site.")
+@click.option(
+    "--folder",
+    type=click.Path(path_type=Path),
+    default="sessions",
+    help="Where the screens keep sessions.  [default: sessions]",
+)
 @click.pass_context
-def pkmcal(context: click.Context) -> None:
+def pkmcal(context: click.Context, site: Path | None, folder: Path) -> None:
     """Calibrate parallel-kinematic machines: measure, identify, correct, verify.
 
     Without a verb, the screens open.
@@ -87,7 +94,9 @@ def pkmcal(context: click.Context) -> None:
                 "the screens are not part of this installation",
                 remedy="Use the verbs: pkmcal --help lists them",
             ) from None
-        run()
+        run(site, root=folder)
+    elif site is not None:
+        raise click.UsageError("--site before a verb is for the screens; write it after the verb")
 
 
 def main(arguments: list[str] | None = None) -> None:

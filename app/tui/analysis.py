@@ -7,7 +7,8 @@ import numpy as np
 
 from app.analysis import load_rows
 from calib.arrays import Array
-from calib.identify import Fit, fit, fit_report
+from calib.discover.run_diagnosis import fit_effects
+from calib.identify import Fit, fit_report
 from calib.identify.fitting import begin
 from calib.model import Model
 
@@ -36,9 +37,13 @@ class FitAnswer:
 def identify(runs: tuple[str, ...], effects: tuple[str, ...] = ()) -> FitAnswer:
     """Read runs and fit them; raises :class:`calib.errors.BadInput`."""
     rows, chosen = load_rows(runs, effects)
-    model = Model(rows, chosen)
-    found = fit(model)
-    nominal, _ = begin(model, found.accepted)
+    return answer_of(runs, fit_effects(rows, chosen))
+
+
+def answer_of(runs: tuple[str, ...], found: Fit) -> FitAnswer:
+    """Report a fit, with how far the same readings were off before it."""
+    nominal, _ = begin(Model(found.model.rows, ()), found.accepted)
     before = np.linalg.norm(nominal.residual[:, found.accepted], axis=0)
     after = np.linalg.norm(found.linear.residual[:, found.accepted], axis=0)
+    effects = tuple(effect.id for effect in found.model.effects)
     return FitAnswer(runs, effects, found, fit_report(found), before, after)

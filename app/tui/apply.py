@@ -69,7 +69,7 @@ class ApplyFace(Face):
         left_out = comparison.proposal.left_out if comparison is not None else {}
         stages.update(stages_text(picture, left_out, stages.content_size.height or 6))
         self.query_one("#apply-sets", Static).update(sets_text(corrections.snapshots))
-        drawn = (comparison, self.wide, self.desk.answer_fit)
+        drawn = (comparison, self.wide, self.desk.study.answer)
         if drawn != self._drawn:
             self._drawn = drawn
             self._fill(comparison)
@@ -79,7 +79,7 @@ class ApplyFace(Face):
         table.clear(columns=True)
         table.border_subtitle = ""
         if comparison is None:
-            fitted = self.desk.answer_fit is not None
+            fitted = self.desk.study.answer is not None
             table.add_column("")
             table.add_row("c compares the fit with the controller" if fitted
                           else "Nothing is fitted yet: go to Fit (3)")  # fmt: skip

@@ -74,7 +74,7 @@ class Corrections:
 
     def _model_file(self) -> Path:
         """Write the fit down: what is applied must be there to be read later."""
-        answer = self._desk.answer_fit
+        answer = self._desk.study.answer
         if answer is None:
             raise BadInput("nothing is fitted yet", remedy="Fit a run on the Fit screen first")
         folder = Path(answer.runs[0])

@@ -13,19 +13,16 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from app.errors import GateRefused, StoppedByOperator
-from app.model_files import write_model
 from app.session import events as ev
 from app.session.events import DeviceStates
 from app.session.plan import Plan
 from app.session.session import Outcome, Session
 from app.session.station import Station
 from app.site import Site, load_site, site_of_mock
-from app.tui.analysis import FitAnswer, identify
 from app.tui.correction import KEEP, Corrections
 from app.tui.picture import Picture
-from app.tui.shelf import runs_under
+from app.tui.study import Study
 from app.tui.verifying import Verified, verification_plan, verified
-from calib.errors import BadInput
 from drivers.errors import ConnectFailed, DeviceError, Silence
 
 _Answer = TypeVar("_Answer")
@@ -56,9 +53,7 @@ class Desk:
         self._job: asyncio.Task[Any] | None = None
         self.corrections = Corrections(self)
         self._connecting = False
-        self.chosen_runs: tuple[str, ...] = ()
-        self.effects: tuple[str, ...] = ()
-        self.answer_fit: FitAnswer | None = None
+        self.study = Study(root, self.picture)
         self.before: Verified | None = None
         self.after: Verified | None = None
 
@@ -244,35 +239,8 @@ class Desk:
         if session.plan.purpose == "verify":
             await self._judge(outcome.folder)
         elif session.plan.purpose == "measure":
-            self.chosen_runs = (str(outcome.run_folder),)
+            self.study.choose((str(outcome.run_folder),))
         return outcome
-
-    # what was measured
-
-    async def identify(self) -> None:
-        """Fit the chosen runs, or the latest; raises :class:`BadInput`."""
-        runs = self.chosen_runs
-        if not runs:
-            latest = runs_under(self.root)
-            if not latest:
-                raise BadInput("there is no run yet", remedy="Measure one, or choose a folder (o)")
-            runs = (str(latest[0]),)
-        # Arithmetic goes beside the event loop: stop key and drivers must not wait for it.
-        answer = await asyncio.to_thread(identify, runs, self.effects)
-        self.chosen_runs, self.answer_fit = runs, answer
-        report = answer.report
-        self.picture.write(
-            f"fitted {report['readings']} readings: RMS {answer.before_um:.1f} -> "
-            f"{report['rms_um']:.1f} um, floor {report['noise_floor_um']:.1f}",
-            "good",
-        )
-
-    async def save_model(self, path: Path) -> None:
-        """Write the fitted model to a file."""
-        if self.answer_fit is None:
-            raise BadInput("nothing is fitted yet", remedy="Fit a run first (f)")
-        write_model(path, self.answer_fit.fit)
-        self.picture.write(f"model written to {path}", "good")
 
     # what it is worth
 

@@ -1,6 +1,5 @@
 """Fit: identify the parameters from a run, see what they are worth and what stays open."""
 
-import shlex
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -13,10 +12,9 @@ from textual.content import Content
 from textual.widgets import DataTable, Static
 
 from app.tui.analysis import FitAnswer
-from app.tui.dialogs import Enter, Pick
+from app.tui.choosing import ask_for_model_file, choose_runs
 from app.tui.face import Face
 from app.tui.picture import Picture
-from app.tui.shelf import runs_under
 from app.tui.widgets.plots import PairPlot
 
 
@@ -62,8 +60,8 @@ class FitFace(Face):
 
     def show(self, picture: Picture) -> None:
         """Draw the answer; the table only when it is another one."""
-        answer = self.desk.answer_fit
-        self.query_one("#fit-summary", Static).update(summary(answer, self.desk.chosen_runs))
+        answer = self.desk.study.answer
+        self.query_one("#fit-summary", Static).update(summary(answer, self.desk.study.runs))
         if answer is self._drawn:
             return
         self._drawn = answer
@@ -99,46 +97,15 @@ class FitFace(Face):
 
     def action_fit(self) -> None:
         """Fit."""
-        self.act(self.desk.identify, busy="fitting ...")
+        self.act(self.desk.study.identify, busy="fitting ...")
 
     def action_choose(self) -> None:
         """Choose a run of the sessions, or type folders."""
-        found = [(str(folder), folder.parent.name) for folder in runs_under(self.desk.root)]
-        if not found:
-            self._type_runs()
-            return
-
-        def picked(answer: str | None) -> None:
-            if answer:
-                self._fit_runs((answer,))
-            elif answer == "":
-                self._type_runs()
-
-        options = [*found, ("", "other runs: type their folders")]
-        self.app.push_screen(Pick("Choose run", "Runs of sessions, newest first", options), picked)
-
-    def _type_runs(self) -> None:
-        def entered(answer: str | None) -> None:
-            if answer:
-                self._fit_runs(tuple(shlex.split(answer)))
-
-        text = "Folders of the runs; several, with blanks between them, are fitted together"
-        self.app.push_screen(Enter("Runs to fit", text), entered)
-
-    def _fit_runs(self, runs: tuple[str, ...]) -> None:
-        self.desk.chosen_runs = runs
-        self.action_fit()
+        choose_runs(self, self.action_fit)
 
     def action_save(self) -> None:
         """Write a model file."""
-
-        def entered(answer: str | None) -> None:
-            if answer:
-                self.act(lambda: self.desk.save_model(Path(answer)))
-
-        self.app.push_screen(
-            Enter("Save model", "File for the effects and parameters found", "model.toml"), entered
-        )
+        ask_for_model_file(self)
 
 
 def summary(answer: FitAnswer | None, runs: tuple[str, ...]) -> Content:

@@ -72,6 +72,7 @@ class Picture:
 
     revision: int = 0
     run: RunState = "idle"
+    doing: str = ""
     purpose: str = ""
     title: str = ""
     steps: list[StepLine] = field(default_factory=list)

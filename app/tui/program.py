@@ -13,6 +13,7 @@ from app.tui.apply import ApplyFace
 from app.tui.desk import POLL_S, Desk
 from app.tui.devices import DevicesFace
 from app.tui.dialogs import Ask, Choose, Help
+from app.tui.discover import DiscoverFace
 from app.tui.face import Face
 from app.tui.fit import FitFace
 from app.tui.log import LogFace
@@ -24,7 +25,9 @@ from app.tui.wording import said
 from calib.errors import BadInput
 from drivers.errors import DeviceError
 
-FACES: tuple[type[Face], ...] = (DevicesFace, MeasureFace, FitFace, ApplyFace, VerifyFace, LogFace)
+FACES: tuple[type[Face], ...] = (
+    DevicesFace, MeasureFace, FitFace, DiscoverFace, ApplyFace, VerifyFace, LogFace,
+)  # fmt: skip
 FORESEEN = (BadInput, DeviceError, GateRefused, OSError)
 
 
@@ -52,7 +55,7 @@ class Workbench(App[None]):
         Binding("b", "hide_banner", "Hide banner", show=False,
                 tooltip="Hide the banner; its text stays in the log"),
         Binding("f1", "help", "Help", tooltip="What this screen is for, and its keys"),
-        Binding("ctrl+p", "command_palette", "Palette", tooltip="Find any action by its name"),
+        Binding("ctrl+p", "command_palette", "Find", tooltip="Find any action by its name"),
         Binding("ctrl+q", "quit", "Quit", tooltip="Leave; asks if a job runs"),
     ]  # fmt: skip
 
@@ -95,9 +98,15 @@ class Workbench(App[None]):
                 self.desk.picture.revision += 1  # its event has said so already
             except FORESEEN as error:
                 self.put_up(error)
+            finally:
+                if busy and picture.doing == busy:
+                    picture.doing = ""
+                    picture.revision += 1
 
+        picture = self.desk.picture
         if busy:
-            self.desk.picture.write(busy)
+            picture.write(busy)
+            picture.doing = busy
         self.run_worker(guarded(), group="act", exit_on_error=True)
 
     def put_up(self, error: Exception) -> None:
@@ -115,7 +124,8 @@ class Workbench(App[None]):
         async def stop() -> None:
             words = await self.desk.stop()
             self.desk.picture.write(f"STOP: {words}", "warn")
-            self.notify(words, title="STOP", severity="warning")
+            if self.desk.picture.trouble is None or "NOT" in words:
+                self.notify(words, title="STOP", severity="warning")
 
         self.run_worker(stop(), group="stop", exit_on_error=True)
 
@@ -142,7 +152,9 @@ class Workbench(App[None]):
         keys = [
             (self.get_key_display(binding), binding.description, binding.tooltip)
             for binding in bindings_of(type(face)) + bindings_of(type(self))
+            if not binding.action.startswith("show_face")
         ]
+        keys.append((f"1-{len(FACES)}", "Screens", "Show a screen"))
         self.push_screen(Help(f"Help: {face.label}", face.about, keys))
 
     async def action_quit(self) -> None:

@@ -71,12 +71,12 @@ async def test_connect_measure_fit_apply_verify_undo(tmp_path: Path) -> None:
         assert all(step.state == "done" for step in desk.picture.steps)
 
         await pilot.press("3", "f")
-        await until(pilot, lambda: desk.answer_fit is not None, 15.0)
-        assert desk.answer_fit is not None
-        report = desk.answer_fit.report
-        assert report["rms_um"] < 0.1 * desk.answer_fit.before_um
+        await until(pilot, lambda: desk.study.answer is not None, 15.0)
+        assert desk.study.answer is not None
+        report = desk.study.answer.report
+        assert report["rms_um"] < 0.1 * desk.study.answer.before_um
 
-        await pilot.press("4", "c")
+        await pilot.press("5", "c")
         await until(pilot, lambda: desk.corrections.comparison is not None, 10.0)
         await pilot.press("a")
         await pilot.pause(0.1)
@@ -87,13 +87,13 @@ async def test_connect_measure_fit_apply_verify_undo(tmp_path: Path) -> None:
         assert len(desk.corrections.snapshots) == 2
         assert desk.picture.stages[-1].stage == "done"
 
-        await pilot.press("5", "v", "q")
+        await pilot.press("6", "v", "q")
         await until(pilot, lambda: desk.after is not None, 40.0)
         assert desk.after is not None
         assert desk.after.found.truth is not None
         assert desk.after.found.truth.position_peak_um < 15.0
 
-        await pilot.press("4", "u")
+        await pilot.press("5", "u")
         await pilot.pause(0.3)
         await pilot.press("end", "enter")
         await until(pilot, lambda: len(desk.corrections.snapshots) == 3, 10.0)

@@ -12,6 +12,7 @@ from app.tui.dialogs import Ask, Choose, Enter, Help, choice_keys
 from app.tui.face import Face
 from app.tui.program import FACES, Workbench, bindings_of
 from app.tui.widgets.frame import Banner, TopLine
+from calib.errors import BadInput
 
 
 @pytest.fixture
@@ -183,3 +184,31 @@ async def test_leaving_asks_while_a_job_runs(bench: Workbench) -> None:
         await pilot.press("ctrl+q")
         await pilot.pause(0.2)
     assert bench.return_code == 0
+
+
+async def test_discover_adds_refuses_and_removes(bench: Workbench) -> None:
+    run = Path(__file__).parent.parent / "data" / "runs" / "backlash-leg-3"
+    study = bench.desk.study
+    study.choose((str(run),))
+    async with bench.run_test(size=(160, 48)) as pilot:
+        await study.diagnose()
+        await pilot.press("4")
+        await pilot.pause(0.4)
+        assert study.search is not None
+        assert study.search.present.diagnosis["candidates"][0]["effect"] == "backlash"
+        await pilot.press("a")
+        async with asyncio.timeout(60.0):
+            while study.effects != ("backlash",):  # noqa: ASYNC110 - a plain value, not an event
+                await asyncio.sleep(0.05)
+        before, after = study.search.stairs
+        assert after.rms_um < 0.9 * before.rms_um
+        assert study.answer is not None
+        assert study.answer.effects == ("backlash",)
+        with pytest.raises(BadInput, match="not accepted"):
+            await study.change("add", "tracker-drift")
+        assert study.effects == ("backlash",)
+        await pilot.press("x")
+        async with asyncio.timeout(60.0):
+            while study.effects:  # noqa: ASYNC110
+                await asyncio.sleep(0.05)
+        assert study.search.stairs[-1].rms_um == before.rms_um

@@ -23,8 +23,8 @@ async def full(pilot: Pilot[Any], folder: Path) -> Workbench:
     assert isinstance(bench, Workbench)
     await stream.put_up(bench, folder)
     desk = bench.desk
-    desk.chosen_runs = (str(RUN),)
-    await desk.identify()
+    desk.study.choose((str(RUN),))
+    await desk.study.identify()
     desk.before, desk.after = stream.verified(600.0, 1), stream.verified(5.0, 2)
     desk.corrections.comparison = stream.compared()
     desk.corrections.snapshots = stream.snapshots()
@@ -39,7 +39,11 @@ async def full(pilot: Pilot[Any], folder: Path) -> Workbench:
 @pytest.mark.parametrize("number", range(1, len(FACES) + 1), ids=[face.mode for face in FACES])
 def test_screen(snap_compare: Look, tmp_path: Path, number: int, size: tuple[int, int]) -> None:
     async def show(pilot: Pilot[Any]) -> None:
-        await full(pilot, tmp_path)
+        bench = await full(pilot, tmp_path)
+        if FACES[number - 1].mode == "discover":
+            bench.desk.study.choose((str(RUN.parent / "backlash-leg-3"),))
+            await bench.desk.study.diagnose()
+            await bench.desk.study.change("add", "backlash")
         await pilot.press(str(number))
         await pilot.pause(0.5)
 

@@ -44,6 +44,8 @@ def state_text(picture: Picture, connected: bool) -> str:
     """Say in a few words what goes on, the most urgent first."""
     if picture.prompt is not None:
         return "? asks you: r replies"
+    if picture.doing and not picture.busy:
+        return f"… {picture.doing.removesuffix(' ...')}"
     if picture.run == "idle":
         return "● connected" if connected else "○ not connected"
     text = _RUN[picture.run]

@@ -1,6 +1,7 @@
 """Plots that grow while the machine measures: decimated, redrawn only when there is news."""
 
 from collections.abc import Collection, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,6 +110,30 @@ class PairPlot(QuietPlot):
         self.border_subtitle = "   ".join(
             f"{marker} {name}" for name, (marker, _) in zip(drawn, SERIES, strict=False)
         )
+
+
+class BinPlot(QuietPlot):
+    """What the residual asks for, bin by bin, over the variable on which it depends."""
+
+    def show(self, structure: Mapping[str, Any]) -> None:
+        """Draw bins (middle, value, sigma) with error bars, and zero."""
+        bins = structure["bins"]
+        if not self.changed(id(structure)):
+            return
+        self.clear()
+        if not bins:
+            return
+        x = np.array([0.5 * (each["from"] + each["to"]) for each in bins])
+        y = np.array([each["value"] for each in bins])
+        sigma = np.array([each["sigma"] for each in bins])
+        reach = float(np.max(np.abs(y) + sigma)) * 1.1
+        self.set_ylimits(-reach, reach)
+        self.plot(x[[0, -1]], np.zeros(2), line_style="#7d8d9a", hires_mode=HiResMode.BRAILLE)
+        self.errorbar(x, y, yerr=sigma, marker="o", marker_style="#e8b45a")
+        over = structure["channel"]
+        if structure["period"]:
+            over += f" modulo {structure['period']:.3g}"
+        self.border_title = f"{structure['shows_in']}, {structure['unit']}, over {over}"
 
 
 def thin(x: Array, y: Array, most: int) -> tuple[Array, Array]:

@@ -1,0 +1,257 @@
+"""Discover: which physical effect is missing; add it and watch the error fall."""
+
+import math
+from typing import Any, ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal, Vertical
+from textual.content import Content
+from textual.widgets import DataTable, Static
+
+from app.tui.choosing import ask_for_model_file, choose_runs
+from app.tui.dialogs import Pick
+from app.tui.discovering import Search, Stair, View
+from app.tui.face import Face
+from app.tui.picture import Picture
+from app.tui.widgets.plots import BinPlot
+
+STAIRS = 4
+"""How many of the last steps are shown."""
+
+
+class DiscoverFace(Face):
+    """Compare, diagnose, add, watch the error fall, undo."""
+
+    mode = "discover"
+    label = "Discover"
+    about = (
+        "d asks what the model of the chosen run misses. The candidates stand below, the most "
+        "likely first; p pays for having looked at all of them. a adds the marked one, the model "
+        "is fitted again and the staircase goes down one step, or the effect is refused because "
+        "poses that the fit has not seen speak against it. x takes one out. g goes on by itself. "
+        "'Where it fails' says on what the residual depends; v shows the next one as a picture. "
+        "What is in the model here is used by Fit and Apply."
+    )
+    AUTO_FOCUS: ClassVar[str | None] = "#candidates"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("d", "diagnose", "Diagnose", tooltip="Fit the chosen run and ask what is missing"),
+        Binding("o", "choose", "Run", tooltip="Choose or type the runs to look at"),
+        Binding("a", "add", "Add", tooltip="Put the marked effect into the model"),
+        Binding("x", "remove", "Remove", tooltip="Take an effect out of the model"),
+        Binding("g", "go_on", "Go on", tooltip="Add by itself what is called for"),
+        Binding("v", "next", "View", tooltip="Show the next dependence"),
+        Binding("s", "save", "Save", tooltip="Write the model to a file, for fit and apply"),
+    ]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._drawn: tuple[object, ...] | None = None
+        self._shown = 0
+
+    def body(self) -> ComposeResult:
+        """Staircase and where it fails on top; advice; candidates."""
+        with Horizontal(id="discover-top"):
+            yield Static(id="stairs", classes="panel")
+            yield Static(id="fails", classes="panel")
+            yield BinPlot("", id="bins")
+        yield Static(id="advice", classes="panel")
+        with Vertical(id="discover-low"):
+            yield DataTable(id="candidates", cursor_type="row", zebra_stripes=True)
+            yield Static(id="found", classes="panel")
+
+    def on_mount(self) -> None:
+        """Name the panels."""
+        for name, title in (
+            ("stairs", "Staircase, µm"), ("fails", "Where it fails"), ("advice", "Answer"),
+            ("candidates", "Candidates"), ("found", "In the model"),
+        ):  # fmt: skip
+            self.query_one(f"#{name}").border_title = title
+
+    def show(self, picture: Picture) -> None:
+        """Draw everything, but only when the search has moved."""
+        search = self.desk.study.search
+        view = search.view if search is not None else None
+        drawn = (view, self._shown, self.wide)
+        if drawn == self._drawn:
+            return
+        self._drawn = drawn
+        self.query_one("#stairs", Static).update(stairs_text(search, 26 if self.wide else 8))
+        self.query_one("#fails", Static).update(fails_text(view, self._shown, self.wide))
+        self.query_one("#advice", Static).update(advice_text(view))
+        self.query_one("#found", Static).update(found_text(view))
+        self._fill(view)
+        if view is not None:
+            structure = view.comparison["structure"]
+            if structure:
+                self.query_one(BinPlot).show(structure[self._shown % len(structure)])
+
+    def _fill(self, view: View | None) -> None:
+        table = self.query_one("#candidates", DataTable)
+        table.clear(columns=True)
+        names = ("p", "RMS", "held out", "visible")
+        table.add_columns("effect", *(Text(n, justify="right") for n in names), "size")
+        if view is None:
+            return
+        for candidate in view.diagnosis["candidates"]:
+            table.add_row(*candidate_row(candidate), key=candidate["effect"])
+        table.border_subtitle = "RMS and held out: after adding, µm;  a adds"
+
+    # keys
+
+    def action_diagnose(self) -> None:
+        """Diagnose the chosen run with the effects that are in the model."""
+        self._shown = 0
+        self.act(self.desk.study.diagnose, busy="asking what is missing ...")
+
+    def action_choose(self) -> None:
+        """Choose a run of the sessions, or type folders."""
+        choose_runs(self, self.action_diagnose)
+
+    def action_save(self) -> None:
+        """Write a model file."""
+        ask_for_model_file(self)
+
+    def action_add(self) -> None:
+        """Add the marked candidate."""
+        table = self.query_one("#candidates", DataTable)
+        search = self.desk.study.search
+        if search is None or search.view is None or not table.row_count:
+            self.notify("Diagnose first (d).")
+            return
+        name = search.view.diagnosis["candidates"][table.cursor_row]["effect"]
+        self.act(lambda: self.desk.study.change("add", name), busy=f"adding {name} ...")
+
+    def action_remove(self) -> None:
+        """Choose what to take out."""
+        search = self.desk.study.search
+        effects = search.view.effects if search is not None and search.view is not None else ()
+
+        def picked(answer: str | None) -> None:
+            if answer:
+                self.act(
+                    lambda: self.desk.study.change("remove", answer), busy=f"removing {answer}"
+                )
+
+        if not effects:
+            self.notify("There is no effect in the model.")
+        elif len(effects) == 1:
+            picked(effects[0])
+        else:
+            options = [(name, name) for name in effects]
+            self.app.push_screen(Pick("Remove", "Which effect is to be taken out?", options),
+                                 picked)  # fmt: skip
+
+    def action_go_on(self) -> None:
+        """Let the program add what is called for."""
+        if self.desk.study.search is None:
+            self.notify("Diagnose first (d).")
+            return
+        self.act(lambda: self.desk.study.change("go on"), busy="adding what is called for ...")
+
+    def action_next(self) -> None:
+        """Show the next dependence."""
+        self._shown += 1
+        self.draw()
+
+
+def stairs_text(search: Search | None, room: int) -> Content:
+    """The error after each step; a bar of ``room`` signs: noise, and what is left to explain."""
+    if search is None:
+        return Content.from_markup(
+            "[bold $accent]d[/] asks what the model of the\nchosen run misses"
+        )
+    shown = search.stairs[-STAIRS:]
+    top = max(stair.rms_um for stair in search.stairs)
+    lines = [Content.from_markup("[dim]                 RMS held out  ░ noise █ left[/]")]
+    for number, stair in enumerate(shown):
+        line = f"{_cut(stair.did, 14):<14}{stair.rms_um:6.2f}{_um(stair.holdout_um)} "
+        last = number == len(shown) - 1
+        lines.append(Content.assemble((line, "bold" if last else ""), bar(stair, top, room)))
+    floor = shown[-1]
+    line = f"{'perfect':<14}{floor.floor_um:6.2f}{_um(floor.holdout_floor_um)}"
+    lines.append(Content.assemble((line, "$success")))
+    return Content("\n").join(lines)
+
+
+def bar(stair: Stair, top: float, room: int) -> Content:
+    """A bar as long as the RMS: the part that a perfect model would leave, and the rest."""
+    noise = round(room * min(stair.floor_um, stair.rms_um) / top)
+    rest = max(0, round(room * stair.rms_um / top) - noise)
+    return Content.assemble(("░" * noise, "dim"), ("█" * rest, "$accent"))
+
+
+def _um(value: float) -> str:
+    return f"{value:9.2f}" if math.isfinite(value) else f"{'-':>9}"
+
+
+def _cut(text: str, room: int) -> str:
+    return text if len(text) <= room else text[: room - 1] + "…"
+
+
+def fails_text(view: View | None, shown: int, wide: bool) -> Content:
+    """What the residual depends on, the strongest first; ``shown`` is the one in the picture."""
+    if view is None:
+        return Content("")
+    structure = view.comparison["structure"]
+    lines = []
+    for number, each in enumerate(structure[: 12 if wide else 5]):
+        sign, style = ("!", "$warning") if each["significant"] else ("·", "dim")
+        period = f", period {each['period']:.3g}" if each["period"] else ""
+        mark = "▸" if wide and number == shown % len(structure) else " "
+        p = f"   p {each['p_value']:.1g}" if wide else ""
+        name = _cut(each["channel"] + period, 22)
+        lines.append(
+            Content.assemble(
+                (f"{mark}{sign} ", style), f"{name:<22}{each['explains_um']:5.1f} µm", (p, "dim")
+            )
+        )
+    repeats = view.comparison["repeatability"]
+    if repeats is not None:
+        lines.append(Content(f"   repeats within {repeats['times_stated_sigma']:.2f} sigma"))
+    return Content("\n").join(lines)
+
+
+def advice_text(view: View | None) -> Content:
+    """The answer in one sentence, and what cannot be told apart."""
+    if view is None:
+        return Content("")
+    diagnosis = view.diagnosis
+    mark = ("✓ ", "$success") if diagnosis["adequate"] else ("! ", "$warning")
+    text = Content.assemble(mark, diagnosis["advice"])
+    for group in diagnosis["indistinguishable"]:
+        text = Content.assemble(text, ("  Cannot be told apart: ", "bold"), ", ".join(group), ".")
+    return text
+
+
+def found_text(view: View | None) -> Content:
+    """Effects in the model with their sizes."""
+    if view is None or not view.effects:
+        return Content.from_markup("[dim]geometry only[/]")
+    lines = [Content.assemble((", ".join(view.effects), "bold"))]
+    lines += [
+        Content(f"{p['name']} = {p['value']:.4g} ± {p['sigma']:.2g} {p['unit']}")
+        for p in view.parameters
+    ]
+    return Content("\n").join(lines)
+
+
+def candidate_row(candidate: dict[str, Any]) -> list[Text]:
+    """Cells of one candidate."""
+    likely = candidate["p_value"] < 0.05
+    style = "bold" if likely else "dim"
+    held = candidate["holdout_rms_after_um"]
+    sizes = [f"{p['value']:.3g} ± {p['sigma']:.1g} {p['unit']}" for p in candidate["parameters"]]
+    more = f" (+{len(sizes) - 1})" if len(sizes) > 1 else ""
+    numbers = (
+        f"{candidate['p_value']:.1g}",
+        f"{candidate['rms_after_um']:.2f}" if candidate["rms_after_um"] is not None else "-",
+        f"{held:.2f}" if held is not None else "-",
+        f"{100 * candidate['visible']:.0f} %",
+    )
+    return [
+        Text(("! " if likely else "  ") + candidate["effect"], style),
+        *(Text(number, style, justify="right") for number in numbers),
+        Text(sizes[0] + more if sizes and likely else "", style),
+    ]

@@ -1,0 +1,115 @@
+"""The discovery of one analysis: which effects are in the model, and how the error fell."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from app.analysis import load_rows
+from calib.discover.compare_report import compare_report
+from calib.discover.forward import SLACK
+from calib.discover.run_compare import compare_fit
+from calib.discover.run_diagnosis import RunDiagnosis
+from calib.discover.run_discovery import SEED, Refitter, discover_run, stage_of
+from calib.discover.run_report import diagnosis_report, effect_parameters
+from calib.effects import catalogue
+from calib.errors import BadInput
+
+
+@dataclass(frozen=True)
+class Stair:
+    """One step of the staircase: what was done, and the error after it, um; nan if unknown."""
+
+    did: str
+    rms_um: float
+    floor_um: float
+    holdout_um: float
+    holdout_floor_um: float
+    chi2_per_dof: float
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What is known of the present model: diagnosis and comparison as their verbs answer them."""
+
+    effects: tuple[str, ...]
+    run: RunDiagnosis
+    diagnosis: Mapping[str, Any]
+    comparison: Mapping[str, Any]
+    parameters: list[dict[str, Any]]
+
+
+@dataclass(eq=False)
+class Search:
+    """Effects put in and taken out of the model of some runs; the runs are never written to.
+
+    The hold-out is that of the runs as they were loaded; each model is fitted once.
+    """
+
+    runs: tuple[str, ...]
+    refit: Refitter
+    stairs: list[Stair] = field(default_factory=list)
+    view: View | None = None
+
+    @staticmethod
+    def of(runs: tuple[str, ...], effects: tuple[str, ...] = ()) -> "Search":
+        """Load runs and look at the model with these effects."""
+        rows, chosen = load_rows(runs, effects)
+        known = {effect.id: effect for effect in (*catalogue(rows.machine), *chosen)}
+        search = Search(runs, Refitter(rows, tuple(known.values())))
+        names = tuple(effect.id for effect in chosen)
+        search._climb("start", names)
+        search._look(names)
+        return search
+
+    @property
+    def present(self) -> View:
+        """The present model."""
+        assert self.view is not None
+        return self.view
+
+    def add(self, name: str) -> None:
+        """Put an effect in; raises :class:`BadInput` if held-out poses speak against it."""
+        before = self.present.run.holdout.rms_mm
+        names = (*self.present.effects, name)
+        after = self.refit(names).run.holdout.rms_mm
+        if after > before * (1.0 + SLACK):
+            raise BadInput(
+                f"{name} is not accepted: poses that the fit has not seen would be predicted worse "
+                f"({1000 * before:.2f} -> {1000 * after:.2f} um)",
+                remedy="It fits noise. Choose another, or measure more",
+            )
+        self._climb(f"+ {name}", names)
+        self._look(names)
+
+    def remove(self, name: str) -> None:
+        """Take an effect out."""
+        names = tuple(each for each in self.present.effects if each != name)
+        self._climb(f"- {name}", names)
+        self._look(names)
+
+    def go_on(self) -> None:
+        """Add by itself what is called for, until nothing more is."""
+        found = discover_run(self.refit, self.present.effects)
+        for number, step in enumerate(found.steps[1:], start=1):
+            did = f"+ {step.added}" if step.added else f"- {step.removed}"
+            self._climb(did, stage_of(found, number).effects)
+        self._look(found.last.effects)
+
+    def _climb(self, did: str, names: tuple[str, ...]) -> None:
+        """Put a step on the staircase."""
+        run = self.refit(names).run
+        fit, held = run.fit, run.holdout
+        self.stairs.append(
+            Stair(
+                did, 1000.0 * fit.rms_mm, 1000.0 * fit.noise_floor_mm,
+                1000.0 * held.rms_mm, 1000.0 * held.floor_mm, fit.chi2_per_dof,
+            )
+        )  # fmt: skip
+
+    def _look(self, names: tuple[str, ...]) -> None:
+        """Diagnose and compare the model where the staircase has come to."""
+        run = self.refit(names).run
+        comparison = compare_report(compare_fit(run.fit, np.random.default_rng(SEED)))
+        self.view = View(names, run, diagnosis_report(run), comparison, effect_parameters(run.fit))

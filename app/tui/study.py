@@ -1,0 +1,109 @@
+"""The study of what was measured: which runs, which effects, the fit, the discovery."""
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal, TypeVar
+
+from app.errors import GateRefused
+from app.model_files import write_model
+from app.tui.analysis import FitAnswer, answer_of, identify
+from app.tui.discovering import Search
+from app.tui.picture import Picture
+from app.tui.shelf import runs_under
+from calib.errors import BadInput
+
+_Answer = TypeVar("_Answer")
+
+
+class Study:
+    """What the Fit and the Discover screen share; runs are read and never written to."""
+
+    def __init__(self, root: Path, picture: Picture) -> None:
+        self._root = root
+        self._picture = picture
+        self._thinking = False
+        self.runs: tuple[str, ...] = ()
+        self.effects: tuple[str, ...] = ()
+        self.answer: FitAnswer | None = None
+        self.search: Search | None = None
+
+    def choose(self, runs: tuple[str, ...]) -> None:
+        """Study other runs; what was found in the last ones is put aside."""
+        if runs != self.runs:
+            self.answer = self.search = None
+            self.effects = ()
+        self.runs = runs
+        self._picture.revision += 1
+
+    def _chosen(self) -> tuple[str, ...]:
+        if not self.runs:
+            latest = runs_under(self._root)
+            if not latest:
+                raise BadInput("there is no run yet", remedy="Measure one, or choose a folder (o)")
+            self.choose((str(latest[0]),))
+        return self.runs
+
+    async def _think(self, what: Callable[[], _Answer]) -> _Answer:
+        """Do arithmetic beside the event loop: stop key and drivers must not wait for it."""
+        if self._thinking:
+            raise GateRefused("still busy with the last question", remedy="Wait for its answer")
+        self._thinking = True
+        try:
+            return await asyncio.to_thread(what)
+        finally:
+            self._thinking = False
+
+    async def identify(self) -> None:
+        """Fit the chosen runs, or the latest; raises :class:`BadInput`."""
+        runs = self._chosen()
+        effects = self.effects
+        self._take(await self._think(lambda: identify(runs, effects)))
+
+    def _take(self, answer: FitAnswer) -> None:
+        self.answer = answer
+        report = answer.report
+        self._picture.write(
+            f"fitted {report['readings']} readings: RMS {answer.before_um:.1f} -> "
+            f"{report['rms_um']:.1f} um, floor {report['noise_floor_um']:.1f}",
+            "good",
+        )
+
+    async def diagnose(self) -> None:
+        """Ask what the model of the chosen runs misses, with the effects that are in it."""
+        runs = self._chosen()
+        effects = self.effects
+        self.search = await self._think(lambda: Search.of(runs, effects))
+        self._tell_stair(self.search)
+
+    async def change(self, what: Literal["add", "remove", "go on"], name: str = "") -> None:
+        """Add or remove an effect, or go on by itself; the fit is then that of the new model."""
+        search = self.search
+        if search is None:
+            raise BadInput("nothing is diagnosed yet", remedy="Diagnose first (d)")
+
+        def work() -> FitAnswer:
+            if what == "add":
+                search.add(name)
+            elif what == "remove":
+                search.remove(name)
+            else:
+                search.go_on()
+            return answer_of(search.runs, search.present.run.fit)
+
+        self._take(await self._think(work))
+        self.effects = search.present.effects
+        self._tell_stair(search)
+
+    def _tell_stair(self, search: Search) -> None:
+        stair = search.stairs[-1]
+        self._picture.write(
+            f"{stair.did}: RMS {stair.rms_um:.2f} um, floor {stair.floor_um:.2f}", "good"
+        )
+
+    async def save(self, path: Path) -> None:
+        """Write the fitted model to a file."""
+        if self.answer is None:
+            raise BadInput("nothing is fitted yet", remedy="Fit a run first")
+        write_model(path, self.answer.fit)
+        self._picture.write(f"model written to {path}", "good")
