@@ -46,9 +46,9 @@ def test_an_actuator_that_drives_two_limbs_by_mistake() -> None:
 
 
 def test_a_chain_that_is_too_short_to_close() -> None:
-    text = changed(text_of("delta"), "tz:-length", "tz:-length tz:200")
+    text = changed(text_of("delta"), "tz:-length_a", "tz:-length_a tz:200")
     message = fault_of(text)
-    assert "does not close at home: limb rod" in message
+    assert "does not close at home: limb tower" in message
     assert "mm and" in message
 
 
