@@ -28,8 +28,8 @@ import tomli_w
 from mocks.canopen.server import CanopenStation
 from mocks.clock import ScaledClock
 from mocks.control import ControlServer, Hands
+from mocks.physics.bodies import BODIES
 from mocks.physics.hidden import Hidden
-from mocks.physics.room import BASE_NESTS, PLATFORM_NESTS
 from mocks.physics.truth import draw_parameters, machine_file, read_parameters
 from mocks.tracker.instrument import SERIAL
 from mocks.tracker.server import TrackerServer
@@ -91,7 +91,7 @@ class MockStation:
 
     def site(self) -> dict[str, Any]:
         """A site file for this station, without its ``format``."""
-        plan = self.world.plan
+        plan, around, load = self.world.plan, self.world.around, self.world.load
         return {
             "title": f"mock {self.world.machine.name}, seed {plan.seed}",
             "machine": self.world.machine.name,
@@ -104,18 +104,18 @@ class MockStation:
                 "model": "AT901-LR", "reflector": "CCR-1.5in", "frame": self._rough_frame(),
             },
             "nests": {
-                "platform": {k: list(v) for k, v in PLATFORM_NESTS.items()},
-                "base": {k: list(v) for k, v in BASE_NESTS.items()},
+                "platform": {k: list(v) for k, v in around.platform_nests.items()},
+                "base": {k: list(v) for k, v in around.base_nests.items()},
             },
             "hands": {
                 "kind": "mock", "control": self.control.address, "smrs": plan.smrs,
                 "base_smrs": plan.base_smrs,
             },
             "load": {
-                "gravity": list(plan.load.gravity),
-                "platform_mass_kg": plan.load.platform_mass_kg,
-                "platform_com": list(plan.load.platform_com),
-                "payload_com": list(plan.load.payload_com),
+                "gravity": list(load.gravity),
+                "platform_mass_kg": load.platform_mass_kg,
+                "platform_com": list(load.platform_com),
+                "payload_com": list(load.payload_com),
             },
             "clock": {"scale": self.clock.scale},
         }  # fmt: skip
@@ -149,7 +149,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("machine", choices=["hexapod"])
+    parser.add_argument("machine", choices=list(BODIES))
     parser.add_argument("--seed", type=int, default=1, help="draws truth, room and noise")
     parser.add_argument("--scale", type=float, default=1.0, help="machine s per wall s")
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
@@ -182,6 +182,7 @@ def build(options: argparse.Namespace) -> MockStation:
         hidden=hidden,
         smrs=options.smrs,
         base_smrs=not options.no_base_smrs,
+        machine=options.machine,
     )
     clock = ScaledClock(options.scale)
     world = World(clock, plan)

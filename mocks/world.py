@@ -1,7 +1,7 @@
-"""The one physical hexapod behind a station's servers, and the room around it.
+"""The one physical machine behind a station's servers, and the room around it.
 
 Everything is a function of machine time, so any thread may ask for any instant and nothing has
-to be stepped. Poses come from the closed form in ``mocks.physics.hexapod``.
+to be stepped. Poses come from the machine's body (``mocks.physics.bodies``).
 """
 
 from collections.abc import Mapping
@@ -11,21 +11,16 @@ import numpy as np
 
 from mocks.clock import Clock, ScaledClock
 from mocks.faults import FaultSet
+from mocks.physics.actuators import Circumstances, Load, play_widths
+from mocks.physics.bodies import body_named
+from mocks.physics.body import Surroundings
 from mocks.physics.climate import Climate
-from mocks.physics.extension import Circumstances, LegErrors, Load, lengths, play_widths
-from mocks.physics.hexapod import HexapodGeometry, Legs, forward, geometry, home_pose
 from mocks.physics.hidden import Hidden
 from mocks.physics.motion import LegMotion
 from mocks.physics.pose import Array, Pose, rotation_from_vector
-from mocks.physics.room import (
-    BASE_NESTS,
-    HOME_REFLECTOR,
-    PLATFORM_NESTS,
-    Distortions,
-    Station,
-)
+from mocks.physics.room import HOME_REFLECTOR, Distortions, Station
 from mocks.physics.signals import Steps
-from mocks.physics.truth import draw_parameters, machine_file
+from mocks.physics.truth import draw_parameters
 from mocks.smrs import BIRDBATH, HAND, Smrs
 
 HAND_AWAY = (0.0, 0.0, -1000.0)
@@ -35,39 +30,42 @@ HAND_AWAY = (0.0, 0.0, -1000.0)
 class WorldPlan:
     """How a world is made.
 
-    ``parameters`` are the true ones (drawn by ``seed`` if None). ``smrs``: one SMR, in the
+    ``machine`` names the body. ``parameters`` are the true ones (drawn by ``seed`` if None);
+    ``load`` that of the body's surroundings if None. ``smrs``: one SMR, in the
     birdbath, or three, in the platform's nests. ``base_smrs``: each base nest holds its own.
     """
 
     seed: int = 1
     parameters: Mapping[str, float] | None = None
     hidden: Hidden = field(default_factory=Hidden)
-    load: Load = field(default_factory=Load)
+    load: Load | None = None
     smrs: int = 1
     base_smrs: bool = True
+    machine: str = "hexapod"
 
 
 class World:
-    """Legs, platform, SMRs, tracker station, climate and faults on one machine clock."""
+    """Actuators (``legs``), platform, SMRs, tracker, climate and faults on one machine clock."""
 
     def __init__(self, clock: Clock | None = None, plan: WorldPlan | None = None) -> None:
         plan = plan or WorldPlan()
         self.clock: Clock = clock or ScaledClock()
         self.plan = plan
-        self.machine = machine_file("hexapod")
+        self.body = body_named(plan.machine)
+        self.machine, self.around = self.body.machine, self.body.around
+        self.load = plan.load or self.around.load
         given = plan.parameters
         self.parameters: dict[str, float] = (
             dict(given) if given is not None else draw_parameters(self.machine, plan.seed)
         )
+        self._real = self.body.real(self.parameters, plan.hidden, self.load, True)
         self.faults = FaultSet()
         self.climate = Climate(plan.seed)
-        self.station = Station(plan.seed)
-        self.distortions = Distortions(plan.hidden)
-        self.legs = [LegMotion(self.clock, widths) for widths in play_widths(plan.hidden)]
-        self.smrs = _smrs(plan)
-        self._errors = LegErrors(plan.hidden, plan.load)
-        self._geometry = true_geometry(self.parameters, plan.hidden)
-        self._home_twist = home_twist(self._geometry)
+        self.station = Station(plan.seed, self.around.place)
+        self.distortions = Distortions(plan.hidden, self.around)
+        widths = play_widths(plan.hidden, self.body.limbs, self.body.stroke)
+        self.legs = [LegMotion(self.clock, width) for width in widths]
+        self.smrs = _smrs(plan, self.around)
         self._payload = Steps(np.zeros(()))
         self._jump = Steps(np.zeros(6))
         self._last: Pose | None = None
@@ -92,13 +90,13 @@ class World:
     def pose(self, times: Array) -> Pose:
         """True poses of the platform in the base frame at ``times`` (N,).
 
-        Where the legs cannot close (opposite ends of their strokes) the platform jams: it stays
-        where it was last, and the fault ``jammed`` stands.
+        Where the actuators do not close (opposite ends of their strokes) the platform jams: it
+        stays where it was last, and the fault ``jammed`` stands.
         """
         circumstances = self._circumstances(times)
         start = self._start(times.size)
         try:
-            pose = solve_pose(self._geometry, self._errors, circumstances, self._home_twist, start)
+            pose = self._real.poses(circumstances, start)
         except (ArithmeticError, np.linalg.LinAlgError):
             self.faults.inject("jammed")
             return start
@@ -106,24 +104,26 @@ class World:
         return pose
 
     def encoder_extension(self) -> Array:
-        """Extension of every leg as its encoder reads it now, (6,), mm."""
+        """Extension of every actuator as its encoder reads it now, (n,), mm or rad."""
         return np.array([leg.position() for leg in self.legs])
 
     def smr_in_tracker(self, smr: str, times: Array) -> Array:
         """Where the centre of an SMR really is at ``times`` (N,), tracker frame, (N, 3), mm."""
         place = self.smrs.places[smr]
-        pose = self.pose(times) if place in PLATFORM_NESTS else None
+        pose = self.pose(times) if place in self.around.platform_nests else None
         return self._smr_at(smr, place, times, pose)
 
     def all_smrs(self, time: float) -> dict[str, Array]:
         """Where the centre of every SMR really is at one instant, tracker frame, (3,), mm."""
         times, places = np.array([time]), self.smrs.places
-        pose = self.pose(times) if set(places.values()) & set(PLATFORM_NESTS) else None
+        pose = self.pose(times) if set(places.values()) & set(self.around.platform_nests) else None
         return {smr: self._smr_at(smr, place, times, pose)[0] for smr, place in places.items()}
 
     def nest_in_tracker(self, nest: str, times: Array) -> Array:
         """Where a nest really is at ``times`` (N,), tracker frame, (N, 3), mm."""
-        return self._nest_at(nest, times, self.pose(times) if nest in PLATFORM_NESTS else None)
+        return self._nest_at(
+            nest, times, self.pose(times) if nest in self.around.platform_nests else None
+        )
 
     def _smr_at(self, smr: str, place: str, times: Array, pose: Pose | None) -> Array:
         if place == BIRDBATH:
@@ -133,9 +133,9 @@ class World:
         return self._nest_at(place, times, pose, self.smrs.centre_off_mm(smr))
 
     def _nest_at(self, nest: str, times: Array, pose: Pose | None, off_mm: float = 0.0) -> Array:
-        centre = np.array((PLATFORM_NESTS | BASE_NESTS)[nest])
+        centre = np.array({**self.around.platform_nests, **self.around.base_nests}[nest])
         centre[2] += off_mm
-        if pose is None or nest in BASE_NESTS:
+        if pose is None or nest in self.around.base_nests:
             level = np.zeros((times.size, 3))
             return self._to_tracker(self.distortions.nest(nest, centre, times, level), times)
         down = -pose.rotation[:, 2, :]
@@ -162,46 +162,19 @@ class World:
 
     def _start(self, count: int) -> Pose:
         if self._last is None:
-            return home_pose(count)
+            return self._real.home(count)
         last = self._last
         return Pose(np.repeat(last.position, count, 0), np.repeat(last.rotation, count, 0))
 
 
-def true_geometry(parameters: Mapping[str, float], hidden: Hidden) -> HexapodGeometry:
-    """Geometry with the hidden tilts of the joints' first axes."""
-
-    def tilt(body: str) -> Array:
-        angles = [hidden.legs(f"joint-tilt.*.{body}.{axis}") for axis in "yz"]
-        return np.stack(angles, axis=1)
-
-    return geometry(parameters, tilt("base"), tilt("platform"))
-
-
-def home_twist(g: HexapodGeometry) -> Array:
-    """Twist of each leg at zero extension, (6,), rad."""
-    _, legs = forward(g, lambda legs, pose: g.L0[None, :], home_pose(1))
-    return np.asarray(legs.twist()[0])
-
-
-def solve_pose(
-    g: HexapodGeometry, errors: LegErrors, c: Circumstances, home: Array, start: Pose
-) -> Pose:
-    """Poses at N instants from what the legs do, hidden errors included."""
-    fixed = lengths(g, c.extension) + errors.fixed(c)
-
-    def wanted(legs: Legs, pose: Pose) -> Array:
-        return fixed + errors.with_pose(c, legs, pose, home) if errors.depends_on_pose else fixed
-
-    return forward(g, wanted, start)[0]
-
-
-def _smrs(plan: WorldPlan) -> Smrs:
-    nests = {**dict.fromkeys(PLATFORM_NESTS, "platform"), **dict.fromkeys(BASE_NESTS, "base")}
+def _smrs(plan: WorldPlan, around: Surroundings) -> Smrs:
+    platform, base = around.platform_nests, around.base_nests
+    nests = {**dict.fromkeys(platform, "platform"), **dict.fromkeys(base, "base")}
     if plan.smrs == 1:
         places = {"smr1": BIRDBATH}
-    elif plan.smrs == len(PLATFORM_NESTS):
-        places = {f"smr{i + 1}": nest for i, nest in enumerate(PLATFORM_NESTS)}
+    elif plan.smrs == len(platform):
+        places = {f"smr{i + 1}": nest for i, nest in enumerate(platform)}
     else:
-        raise ValueError(f"a station has 1 or {len(PLATFORM_NESTS)} SMRs, not {plan.smrs}")
-    fixed = {f"base-{nest}": nest for nest in BASE_NESTS} if plan.base_smrs else {}
+        raise ValueError(f"a station has 1 or {len(platform)} SMRs, not {plan.smrs}")
+    fixed = {f"base-{nest}": nest for nest in base} if plan.base_smrs else {}
     return Smrs(nests, {**places, **fixed, "home": BIRDBATH})

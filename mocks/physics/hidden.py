@@ -1,11 +1,14 @@
 """What is wrong with a mock machine beyond its parameters: a flat table of named numbers.
 
-Names of the catalogue are those of its parameters (``backlash.leg3``, ``thermal-growth.a``).
+Names of the catalogue are those of its parameters (``backlash.leg3``, ``thermal-growth.a``);
+``parallelogram-sides.limb1`` is side 1 less side 2 in mm, ``joint-azimuth.limb1`` the platform
+joint's less the slider's in rad, ``redundancy.limb`` the limb whose constraint is released, wholly
+or by ``redundancy.share`` of its stiffness.
 The names that begin with ``unknown.`` are the mock's own, outside the catalogue:
 
 =================================  ===============================================================
-``unknown.screw-quadratic.legN``   1/mm: extension = k s^2
-``unknown.hysteresis.legN``        mm: extension with a memory of several past reversals
+``unknown.screw-quadratic.legN``   1/mm (1/rad): extension = k s^2
+``unknown.hysteresis.legN``        mm (rad): extension with a memory of several past reversals
 ``unknown.bending.k``              mm/K: legs bend when structure and air differ, sunny side more
 ``unknown.soft-legs.k``            1/N: compliance that grows with extension, k s F
 ``unknown.platform-flex.k``        mm: nests sag within the platform when it tilts
@@ -14,6 +17,8 @@ The names that begin with ``unknown.`` are the mock's own, outside the catalogue
                                    tracker's vertical axis
 ``unknown.two-face.hz``            rad: collimation error, of opposite sign in the two faces
 =================================  ===============================================================
+
+Bending and soft legs are the hexapod's alone; the others go with every machine.
 """
 
 import json
@@ -27,7 +32,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_LEG = r"leg[1-6]"
+_LEG = r"(leg[1-6]|limb[1-3])"
 _CATALOGUE = (
     r"gravity-sag\.c",
     r"thermal-growth\.a",
@@ -43,6 +48,8 @@ _CATALOGUE = (
     r"tracker-drift\.([vw][xyz]|duration)",
     r"nest-offset\.[^.]+\.[xyz]",
     r"frame-shift\.(x|y|z|rx|ry|rz|t0|where)",
+    rf"(parallelogram-sides|joint-azimuth)\.{_LEG}",
+    r"redundancy\.(limb|share)",
 )
 _UNKNOWN = (
     rf"screw-quadratic\.{_LEG}",
@@ -85,9 +92,19 @@ class Hidden:
         """One number; ``default`` where it is not given."""
         return self.values.get(name, default)
 
-    def legs(self, pattern: str) -> Array:
-        """Six numbers: ``pattern`` with ``*`` for leg1..leg6, (6,)."""
-        return np.array([self.get(pattern.replace("*", f"leg{i}")) for i in range(1, 7)])
+    def limbs(self, pattern: str, limbs: tuple[str, ...]) -> Array:
+        """One number for each limb: ``pattern`` with ``*`` for its name, (n,)."""
+        return np.array([self.get(pattern.replace("*", limb)) for limb in limbs])
+
+    def check(self, machine: str, limbs: tuple[str, ...], absent: tuple[str, ...]) -> None:
+        """Raise ValueError for what this machine does not have.
+
+        ``absent``: beginnings of the names of effects that it cannot have.
+        """
+        for name in self.values:
+            limb = re.search(_LEG, name)
+            if (limb is not None and limb.group() not in limbs) or name.startswith(absent):
+                raise ValueError(f'the mock {machine} has no hidden effect "{name}"')
 
     def vector(self, stem: str, names: str = "x y z") -> Array:
         """Numbers ``stem.x``, ``stem.y``, ..., (len(names),)."""

@@ -2,20 +2,10 @@
 
 import numpy as np
 
+from mocks.physics.body import Place, Surroundings
 from mocks.physics.hidden import Hidden
 from mocks.physics.pose import Array, rotation_from_rpy, rotation_from_vector, rpy_from_rotation
 
-BASE_NESTS: dict[str, tuple[float, float, float]] = {
-    "b1": (260.0, 0.0, -30.0),
-    "b2": (0.0, 260.0, -30.0),
-    "b3": (-260.0, 0.0, -30.0),
-    "b4": (0.0, -260.0, -30.0),
-}
-PLATFORM_NESTS: dict[str, tuple[float, float, float]] = {
-    "3": (0.0, 100.0, 0.0),
-    "4": (-86.602540, -50.0, 0.0),
-    "5": (86.602540, -50.0, 0.0),
-}
 HOME_REFLECTOR = (0.0, 180.0, -60.0)
 """Birdbath, tracker frame, mm."""
 
@@ -26,19 +16,20 @@ BEARING_SPREAD_RAD = float(np.radians(6.0))
 class Station:
     """The base frame in the tracker frame: p_tracker = R p_base + t, drawn by ``seed``.
 
-    The tracker stands 1.2 to 1.4 m away, looks down on the machine by 0.42 m, levelled to some
+    The tracker stands 1.2 to 1.4 m away, at a height that suits the machine, levelled to some
     milliradians. It is put where an operator would put it: between two nests of the platform, so
-    that no SMR hides another within the 20 deg by which the platform turns.
+    that no SMR hides another within the 20 deg by which a hexapod's platform turns.
     """
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, place: Place) -> None:
         rng = np.random.default_rng([seed, 2])
-        side = rng.integers(6) * np.pi / 3.0 + np.pi / 6.0
+        every = 2.0 * np.pi / place.bearings
+        side = rng.integers(place.bearings) * every + place.first_rad
         bearing = side + rng.uniform(-1.0, 1.0) * BEARING_SPREAD_RAD
         yaw = rng.uniform(-np.pi, np.pi)
         azimuth = bearing + yaw + np.pi
         distance = rng.uniform(1220.0, 1330.0)
-        height = rng.uniform(-450.0, -390.0)
+        height = rng.uniform(*place.height)
         self.translation = np.array(
             [distance * np.cos(azimuth), distance * np.sin(azimuth), height]
         )
@@ -57,7 +48,8 @@ class Station:
 class Distortions:
     """What the tracker gets wrong, systematically, and what shifts between the frames."""
 
-    def __init__(self, hidden: Hidden) -> None:
+    def __init__(self, hidden: Hidden, around: Surroundings) -> None:
+        self._on_platform = frozenset(around.platform_nests)
         self._scale = hidden.get("tracker-scale.k")
         self._zero = hidden.get("tracker-offset.r0")
         self._v = np.array([hidden.get(f"tracker-drift.v{a}") for a in "xyz"])
@@ -73,9 +65,8 @@ class Distortions:
         self._shift_base: Array = shift if of_base else np.zeros(6)
         self._shift_platform: Array = np.zeros(6) if of_base else shift
         self._flex = hidden.get("unknown.platform-flex.k")
-        self._nests = {
-            nest: hidden.vector(f"nest-offset.{nest}") for nest in (*PLATFORM_NESTS, *BASE_NESTS)
-        }
+        nests = (*around.platform_nests, *around.base_nests)
+        self._nests = {nest: hidden.vector(f"nest-offset.{nest}") for nest in nests}
 
     def nest(self, name: str, centre: Array, times: Array, down: Array) -> Array:
         """SMR centres (N, 3) in the frame that carries the nest, mm.
@@ -83,7 +74,7 @@ class Distortions:
         ``down`` (N, 3) is the direction of gravity in that frame.
         """
         points = centre + self._nests.get(name, np.zeros(3)) + np.zeros((times.size, 3))
-        if name in PLATFORM_NESTS:
+        if name in self._on_platform:
             points = points + self._flex * down * [1.0, 1.0, 0.0]
             points = self._after(times, points, self._shift_platform)
         return np.asarray(points)

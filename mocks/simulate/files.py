@@ -6,27 +6,30 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 
-from mocks.physics.room import BASE_NESTS, PLATFORM_NESTS
+from mocks.physics.bodies import body_named
 from mocks.simulate.run import SimulatedRun
 
 
 def run_toml(run: SimulatedRun) -> str:
     """The text of ``run.toml``."""
     plan = run.plan
+    around = body_named(plan.machine).around
+    load = plan.load or around.load
+    nests = plan.nests or around.platform_nests
     table: dict[str, object] = {
         "format": "pkm-run/1",
-        "machine": "hexapod",
-        "title": plan.title or f"hexapod, {len(run.poses)} poses, {len(plan.nests)} nests",
+        "machine": plan.machine,
+        "title": plan.title or f"{plan.machine}, {len(run.poses)} poses, {len(nests)} nests",
         "tracker": {"model": "AT901-LR"},
         "nests": {
-            "platform": {k: list(v) for k, v in PLATFORM_NESTS.items()},
-            "base": {k: list(v) for k, v in BASE_NESTS.items()},
+            "platform": {k: list(v) for k, v in around.platform_nests.items()},
+            "base": {k: list(v) for k, v in around.base_nests.items()},
         },
         "load": {
-            "gravity": list(plan.load.gravity),
-            "platform_mass_kg": plan.load.platform_mass_kg,
-            "platform_com": list(plan.load.platform_com),
-            "payload_com": list(plan.load.payload_com),
+            "gravity": list(load.gravity),
+            "platform_mass_kg": load.platform_mass_kg,
+            "platform_com": list(load.platform_com),
+            "payload_com": list(load.payload_com),
         },
     }
     if plan.controller:
@@ -43,6 +46,7 @@ def points_csv(run: SimulatedRun) -> str:
     header += [*(["cycle"] if run.plan.cycles > 1 else []), *run.channels]
     lines = [",".join(header)]
     channels = np.column_stack(list(run.channels.values())).tolist()
+    digits = body_named(run.plan.machine).stroke.digits
     places = [2 if name == "delay_s" else 3 for name in run.channels]
     rows = zip(
         run.layout.time.tolist(), run.layout.pose.tolist(), run.layout.labelled.tolist(),
@@ -51,7 +55,7 @@ def points_csv(run: SimulatedRun) -> str:
     )  # fmt: skip
     for time, pose, labelled, nest, q, xyz, s, cov, values, cycle in rows:
         label = ("home" if pose < 0 else str(pose + 1)) if labelled else ""
-        cells = [f"{time:.2f}", label, nest, *(f"{v:.6f}" for v in q)]
+        cells = [f"{time:.2f}", label, nest, *(f"{v:.{digits}f}" for v in q)]
         if nest:
             cells += [f"{v:.6f}" for v in (*xyz, *s)]
             cells += [f"{v:.6e}" for v in cov] if mixed else []
@@ -84,20 +88,3 @@ def write(run: SimulatedRun, folder: Path, truth: Path | None = None) -> None:
     (folder / "run.toml").write_text(run_toml(run), encoding="utf-8", newline="\n")
     (folder / "points.csv").write_text(points_csv(run), encoding="utf-8", newline="\n")
     (truth or folder / "truth.json").write_text(truth_json(run), encoding="utf-8")
-
-
-def read_poses(path: Path) -> np.ndarray:
-    """Poses from a CSV file with columns x, y, z (mm), rx, ry, rz (rad, or rx_deg ...): (N, 6).
-
-    Other columns are ignored. Raises ValueError for a missing column or a cell without a number.
-    """
-    lines = [line.split(",") for line in path.read_text(encoding="utf-8").split("\n") if line]
-    names = [name.strip() for name in lines[0]] if lines else []
-    columns = []
-    for name in ("x", "y", "z", "rx", "ry", "rz"):
-        key = name if name in names else f"{name}_deg"
-        if key not in names:
-            raise ValueError(f"{path}: no column {name}; columns are x, y, z, rx, ry, rz")
-        values = np.array([float(line[names.index(key)]) for line in lines[1:]])
-        columns.append(np.radians(values) if key.endswith("_deg") else values)
-    return np.column_stack(columns)

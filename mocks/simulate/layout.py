@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mocks.physics.body import Surroundings
 from mocks.physics.pose import Array
-from mocks.physics.room import BASE_NESTS
 from mocks.simulate.plan import RunPlan
 
 HOME = -1
@@ -34,17 +34,18 @@ class Layout:
         return np.array([bool(name) for name in self.nest])
 
 
-def arrange(plan: RunPlan, poses: int) -> Layout:
+def arrange(plan: RunPlan, poses: int, around: Surroundings) -> Layout:
     """Rows of a campaign: home, base nests, poses and nests with base nests between, base nests."""
+    nests_used = plan.nests or tuple(around.platform_nests)
     if plan.order == "nest-by-nest":
-        visits = [(p, n, c) for n in plan.nests for c in range(plan.cycles) for p in range(poses)]
+        visits = [(p, n, c) for n in nests_used for c in range(plan.cycles) for p in range(poses)]
     else:
-        visits = [(p, n, c) for c in range(plan.cycles) for p in range(poses) for n in plan.nests]
+        visits = [(p, n, c) for c in range(plan.cycles) for p in range(poses) for n in nests_used]
     rows: list[tuple[int, str, bool, float, int]] = [(HOME, "", True, 0.0, 0)]
     time, before = FIRST_S - MOVE_S, HOME
 
     def base_nests(pose: int, at: float) -> None:
-        rows.extend((pose, nest, False, at, 0) for nest in BASE_NESTS)
+        rows.extend((pose, nest, False, at, 0) for nest in around.base_nests)
 
     for count, (pose, nest, cycle) in enumerate(visits):
         time += NEXT_NEST_S if pose == before else MOVE_S

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from mocks.physics.extension import Load
+from mocks.physics.actuators import Load
 from mocks.physics.hidden import Hidden
 from mocks.physics.pose import Array
 
@@ -33,10 +33,15 @@ class RunPlan:
 
     Attributes
     ----------
+    machine : str
+        A machine that there is a body of (``mocks.physics.bodies``).
     seed : int
         Draws truth, room, noise and, where ``poses`` is a number, the poses.
-    poses : int or array, shape (N, 6)
-        How many random reachable poses, or the poses: x, y, z in mm, rx, ry, rz in rad.
+    poses : int or array, shape (N, k)
+        How many random reachable poses, or the poses in the machine's task coordinates, mm and
+        rad.
+    nests : tuple of str
+        Platform nests that are measured; all if empty.
     order : {"nest-by-nest", "pose-by-pose"}
         One SMR that is carried after each pass, or three SMRs.
     cycles : int
@@ -49,6 +54,8 @@ class RunPlan:
         Readings between two visits of the base nests.
     parameters : mapping, optional
         True parameters; drawn by ``seed`` from ``prior`` if None.
+    load : Load, optional
+        That of the machine's surroundings if None.
     controller : mapping
         Parameters that the controller uses where they are not nominal.
     delays : bool
@@ -60,7 +67,7 @@ class RunPlan:
     seed: int = 1
     poses: int | Array = 60
     order: Order = "nest-by-nest"
-    nests: tuple[str, ...] = ("3", "4", "5")
+    nests: tuple[str, ...] = ()
     cycles: int = 1
     noise_mm: float | None = 0.005
     base_every: int = 45
@@ -69,10 +76,11 @@ class RunPlan:
     prior: Literal["uniform", "normal"] = "uniform"
     controller: Mapping[str, float] = field(default_factory=dict)
     profile: Profile = field(default_factory=Profile)
-    load: Load = field(default_factory=Load)
+    load: Load | None = None
     delays: bool = False
     strays: int = 0
     title: str = ""
+    machine: str = "hexapod"
 
     def rng(self, purpose: int) -> np.random.Generator:
         """A generator of its own for each purpose, so that one choice does not shift another."""

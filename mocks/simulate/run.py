@@ -5,11 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calib.mechanism.description import Machine
+from mocks.physics.bodies import body_named
+from mocks.physics.body import Surroundings
 from mocks.physics.pose import Array, Pose
-from mocks.physics.room import BASE_NESTS, PLATFORM_NESTS, Distortions, Station
+from mocks.physics.room import Distortions, Station
 from mocks.physics.signals import Wander, mean_variance
-from mocks.physics.truth import draw_parameters, machine_file
-from mocks.simulate import hexapod
+from mocks.physics.truth import draw_parameters
+from mocks.simulate import machine as machines
 from mocks.simulate.layout import Layout, arrange
 from mocks.simulate.plan import RunPlan
 from mocks.tracker.sensor import SAMPLES_PER_S, SLOW_TAU_S, NoiseLevels
@@ -23,8 +26,8 @@ LARGEST_DELAY_S = 8.0
 class SimulatedRun:
     """A campaign as it was measured, and the truth about it.
 
-    ``q`` (R, 6); ``xyz`` (R, 3) mm, NaN where a row is no reading; ``covariance`` (R, 6):
-    xx, yy, zz, xy, xz, yz in mm^2; ``poses`` (N, 6) as commanded; ``truth`` the platform's true
+    ``q`` (R, n); ``xyz`` (R, 3) mm, NaN where a row is no reading; ``covariance`` (R, 6):
+    xx, yy, zz, xy, xz, yz in mm^2; ``poses`` (N, k) as commanded; ``truth`` the platform's true
     poses at every row; ``strays`` the rows that were falsified.
     """
 
@@ -43,22 +46,24 @@ class SimulatedRun:
 
 def simulate(plan: RunPlan) -> SimulatedRun:
     """Run a campaign; raises ValueError for poses that are out of reach."""
-    machine = machine_file("hexapod")
+    body = body_named(plan.machine)
+    machine, around = body.machine, body.around
     parameters = dict(plan.parameters or draw_parameters(machine, plan.seed, plan.prior))
-    held = hexapod.controller_parameters(machine, plan.controller)
+    held = machines.controller_parameters(machine, plan.controller)
     poses = (
-        hexapod.random_poses(machine, held, plan, plan.poses)
+        machines.random_poses(body, held, plan, plan.poses)
         if isinstance(plan.poses, int)
         else np.asarray(plan.poses, dtype=float)
     )
-    rows = arrange(plan, len(poses))
-    q = hexapod.commanded_q(held, poses, rows)
-    _check_reach(q, machine.q_limits)
+    rows = arrange(plan, len(poses), around)
+    q = machines.commanded_q(body, held, poses, rows)
+    _check_reach(q, machine)
     channels = _channels(plan, rows)
-    reference = np.array([held[f"leg{i + 1}.L0"] for i in range(q.shape[1])])
-    truth = hexapod.true_poses(parameters, plan, q - reference, channels)
-    station = Station(plan.seed)
-    seen = _seen(plan, rows, truth, station)
+    load = plan.load or around.load
+    extension = q - body.reference(held)
+    truth = machines.true_poses(body, parameters, plan, load, extension, channels)
+    station = Station(plan.seed, around.place)
+    seen = _seen(plan, rows, truth, station, around)
     covariance = _covariance(plan, seen)
     xyz = seen + _noise(plan, seen)
     strays = _strays(plan, rows, xyz)
@@ -69,12 +74,14 @@ def simulate(plan: RunPlan) -> SimulatedRun:
     )  # fmt: skip
 
 
-def _check_reach(q: Array, limits: Array) -> None:
-    outside = np.flatnonzero(np.any((q < limits[:, 0] - 1e-6) | (q > limits[:, 1] + 1e-6), axis=1))
-    if outside.size:
+def _check_reach(q: Array, machine: Machine) -> None:
+    low, high = machine.q_limits.T
+    inside = np.all((q >= low - 1e-6) & (q <= high + 1e-6), axis=1)
+    if not inside.all():
+        unit = machine.actuators[0].unit
         raise ValueError(
-            f"a pose is out of reach: legs {np.round(q[outside[0]], 3).tolist()} mm where "
-            f"{limits[0].tolist()} mm are allowed"
+            f"a pose is out of reach: q {np.round(q[~inside][0], 3).tolist()} {unit} where "
+            f"{low[0]:g} to {high[0]:g} are allowed"
         )
 
 
@@ -99,18 +106,20 @@ def _columns(plan: RunPlan, channels: dict[str, Array]) -> dict[str, Array]:
     return {name: v for name, v in channels.items() if name != "delay_s" or delays}
 
 
-def _seen(plan: RunPlan, rows: Layout, truth: Pose, station: Station) -> Array:
+def _seen(
+    plan: RunPlan, rows: Layout, truth: Pose, station: Station, around: Surroundings
+) -> Array:
     """What a noise-free tracker reads at every row, tracker frame, (R, 3), mm."""
-    distortions = Distortions(plan.hidden)
+    distortions = Distortions(plan.hidden, around)
     down = -truth.rotation[:, 2, :]
     names = np.array(rows.nest)
     base = np.tile([0.0, 0.0, 0.0], (names.size, 1))
-    for nest, centre in (*PLATFORM_NESTS.items(), *BASE_NESTS.items()):
+    for nest, centre in (*around.platform_nests.items(), *around.base_nests.items()):
         here = names == nest
         if not here.any():
             continue
         points = distortions.nest(nest, np.asarray(centre), rows.time[here], down[here])
-        if nest in PLATFORM_NESTS:
+        if nest in around.platform_nests:
             points = Pose(truth.position[here], truth.rotation[here]).points(points)
         base[here] = points
     tracker = station.to_tracker(distortions.base(base, rows.time))

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from mocks.physics.extension import Load, axial_forces
+from mocks.physics.actuators import Load
 from mocks.physics.hexapod import forward, geometry, home_pose, legs
+from mocks.physics.hexapod_body import home_twist
+from mocks.physics.hexapod_legs import axial_forces
 from mocks.physics.pose import (
     Array,
     Pose,
@@ -13,7 +15,6 @@ from mocks.physics.pose import (
     rpy_from_rotation,
 )
 from mocks.physics.truth import draw_parameters, machine_file, nominal_parameters
-from mocks.world import home_twist
 
 MACHINE = machine_file("hexapod")
 NOMINAL = geometry(nominal_parameters(MACHINE))

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.cli import run
 from calib.runs import parse_run
 from mocks.clock import ManualClock
+from mocks.physics.hexapod_body import AROUND
 from mocks.physics.hidden import Hidden
-from mocks.physics.room import PLATFORM_NESTS
 from mocks.simulate import Profile, RunPlan, simulate
-from mocks.simulate.__main__ import main
 from mocks.simulate.files import points_csv, run_toml, truth_json
 from mocks.simulate.run import SimulatedRun
 from mocks.world import World, WorldPlan
@@ -83,17 +83,17 @@ def test_noise_does_not_shift_what_else_the_seed_draws() -> None:
 )  # fmt: skip
 def test_simulated_and_live_machine_are_the_same(hidden: dict[str, float]) -> None:
     effects = Hidden(hidden)
-    run = simulate(RunPlan(seed=7, poses=15, noise_mm=1e-9, hidden=effects, order="pose-by-pose"))
+    made = simulate(RunPlan(seed=7, poses=15, noise_mm=1e-9, hidden=effects, order="pose-by-pose"))
     clock = ManualClock()
     live = World(clock, WorldPlan(seed=7, hidden=effects, smrs=3))
-    for row, nest in enumerate(run.layout.nest):
-        for leg, q in zip(live.legs, run.q[row], strict=True):
+    for row, nest in enumerate(made.layout.nest):
+        for leg, q in zip(live.legs, made.q[row], strict=True):
             leg.command(q - 230.715, 1.0)
         clock.advance(200.0)
-        if nest in PLATFORM_NESTS:
+        if nest in AROUND.platform_nests:
             now = np.array([clock.now()])
             seen = live.distortions.seen(live.nest_in_tracker(nest, now), now)[0]
-            assert run.xyz[row] == pytest.approx(seen, abs=2e-6)
+            assert made.xyz[row] == pytest.approx(seen, abs=2e-6)
 
 
 def test_tracker_noise_is_as_its_covariance_says() -> None:
@@ -109,10 +109,10 @@ def test_tracker_noise_is_as_its_covariance_says() -> None:
 
 
 def test_stray_readings_are_in_the_truth() -> None:
-    run = simulate(RunPlan(seed=9, poses=20, strays=3))
+    made = simulate(RunPlan(seed=9, poses=20, strays=3))
     clean = simulate(RunPlan(seed=9, poses=20))
-    bad = json.loads(truth_json(run))["bad_lines"]
-    differ = np.flatnonzero(np.linalg.norm(np.nan_to_num(run.xyz - clean.xyz), axis=1) > 0.1)
+    bad = json.loads(truth_json(made))["bad_lines"]
+    differ = np.flatnonzero(np.linalg.norm(np.nan_to_num(made.xyz - clean.xyz), axis=1) > 0.1)
     assert bad == [row + 2 for row in differ]
     assert len(bad) == 3
 
@@ -124,11 +124,31 @@ def test_poses_out_of_reach_are_refused() -> None:
 
 def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     poses = tmp_path / "poses.csv"
-    poses.write_text("name,x,y,z,rx_deg,ry_deg,rz_deg\na,1,2,221,3,0,0\nb,-1,-2,219,0,3,0\n")
-    out = tmp_path / "run"
-    assert main(["hexapod", "--poses", str(poses), "--out", str(out), "--noise-um", "5"]) == 0
-    assert sorted(p.name for p in out.iterdir()) == ["points.csv", "run.toml", "truth.json"]
+    poses.write_text("pose,x,y,z,rx,ry,rz\na,1,2,221,0.05,0,0\nb,-1,-2,219,0,0.05,0\n")
+    out, truth = tmp_path / "run", tmp_path / "truth.json"
+    call = ["simulate", "hexapod", "--poses", str(poses), "--out", str(out), "--noise-um", "5"]
+    assert run([*call, "--truth", str(truth), "--effect", "screw-twist.L=2.0", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert (said["poses"], said["readings"]) == (2, 14)
+    assert sorted(p.name for p in out.iterdir()) == ["points.csv", "run.toml"]
+    assert json.loads(truth.read_text())["hidden"] == {"screw-twist.L": 2.0}
     assert (out / "points.csv").read_text().count("\n") == 1 + 1 + 8 + 6
-    bad = ["hexapod", "--poses", str(tmp_path / "none.csv"), "--out", str(out)]
-    assert main(bad) == 2
-    assert "error: " in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        (["--effect", "screw-twist.M=2"], "no hidden effect"),
+        (["--effect", "backlash.limb1=2"], "no hidden effect"),
+        (["--effect", "backlash"], "NAME=VALUE"),
+        (["--poses", "0"], "at least 1"),
+        (["--poses", "none.csv"], "none.csv"),
+        (["--noise-um", "-1"], "positive"),
+    ],
+)
+def test_command_line_says_what_is_wrong(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], wrong: list[str], says: str
+) -> None:
+    assert run(["simulate", "hexapod", "--out", str(tmp_path / "run"), *wrong]) == 2
+    assert says in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()

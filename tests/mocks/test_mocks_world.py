@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from mocks.clock import ManualClock
+from mocks.physics.hexapod_body import AROUND
 from mocks.physics.hidden import Hidden
 from mocks.physics.pose import Array, rotation_from_rpy, rotation_from_vector
-from mocks.physics.room import PLATFORM_NESTS
 from mocks.physics.room import Station as TrackerStation
 from mocks.physics.truth import nominal_parameters
 from mocks.tracker.sensor import Sensor, refraction_ppm
@@ -284,12 +284,12 @@ def test_true_parameters_may_be_given() -> None:
 @pytest.mark.parametrize("seed", range(12))
 def test_no_smr_hides_another_from_the_tracker(seed: int) -> None:
     """Sights of two nests stay apart over the turns of the platform's workspace."""
-    station = TrackerStation(seed)
+    station = TrackerStation(seed, AROUND.place)
     tracker = -station.rotation.T @ station.translation
     turns = np.radians(np.array(np.meshgrid([-9, 0, 9], [-9, 0, 9], [-20, 0, 20]))).reshape(3, -1)
     for rx, ry, rz in turns.T:
         R = rotation_from_rpy(rx, ry, rz)
-        nests = [R @ np.array(n) + [0.0, 0.0, 220.0] for n in PLATFORM_NESTS.values()]
+        nests = [R @ np.array(n) + [0.0, 0.0, 220.0] for n in AROUND.platform_nests.values()]
         for i, j in ((0, 1), (0, 2), (1, 2)):
             sight = (nests[i] - tracker) / np.linalg.norm(nests[i] - tracker)
             apart = nests[j] - nests[i]

@@ -1,0 +1,84 @@
+"""What a machine does at every row of a campaign."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from calib.mechanism.description import Machine
+from mocks.physics.actuators import Circumstances, Load, play_widths
+from mocks.physics.body import Body
+from mocks.physics.play import follow
+from mocks.physics.pose import Array, Pose
+from mocks.physics.truth import nominal_parameters
+from mocks.simulate.layout import HOME, Layout
+from mocks.simulate.plan import RunPlan
+
+DRAWN_AT_ONCE = 4
+
+
+def controller_parameters(machine: Machine, given: Mapping[str, float]) -> dict[str, float]:
+    """All parameters that the controller uses; raises ValueError for an unknown name."""
+    held = nominal_parameters(machine)
+    unknown = set(given) - set(held)
+    if unknown:
+        raise ValueError(f"machine {machine.name} has no parameter {sorted(unknown)[0]}")
+    return {**held, **given}
+
+
+def random_poses(body: Body, held: Mapping[str, float], plan: RunPlan, count: int) -> Array:
+    """``count`` reachable poses drawn from the machine's workspace box, (count, k)."""
+    rng, machine = plan.rng(0), body.machine
+    box = np.array([machine.workspace[name] for name in machine.task.coordinates])
+    low, high = machine.q_limits.T
+    found = np.empty((0, len(box)))
+    while len(found) < count:
+        tried = rng.uniform(box[:, 0], box[:, 1], (DRAWN_AT_ONCE * count, len(box)))
+        q = body.commanded(held, tried)
+        inside = np.all((q >= low) & (q <= high), axis=1)
+        found = np.vstack([found, tried[inside]])
+    return found[:count]
+
+
+def commanded_q(body: Body, held: Mapping[str, float], poses: Array, rows: Layout) -> Array:
+    """Commanded actuator coordinates of every row, (R, n): home is s = 0."""
+    q = np.vstack([body.commanded(held, poses), body.reference(held)])
+    assert HOME == -1, "home is the last row"
+    return np.round(q[rows.pose], body.stroke.digits)
+
+
+def true_poses(
+    body: Body,
+    parameters: Mapping[str, float],
+    plan: RunPlan,
+    load: Load,
+    extension: Array,
+    channels: Mapping[str, Array],
+) -> Pose:
+    """Where the platform really is at every row.
+
+    ``extension`` (R, n) as commanded; ``channels`` (R,): ``structure_temp_C``, ``air_temp_C``,
+    ``payload_kg``, ``delay_s``.
+    """
+    widths = play_widths(plan.hidden, body.limbs, body.stroke)
+    play = np.zeros((*extension.shape, widths.shape[1]))
+    if plan.hidden.has("backlash.") or plan.hidden.has("unknown.hysteresis."):
+        play = follow(extension, widths)
+    circumstances = Circumstances(
+        extension=extension,
+        play=play,
+        step=_last_step(extension, body.stroke.smallest),
+        delay=np.repeat(channels["delay_s"][:, None], extension.shape[1], axis=1),
+        structure=channels["structure_temp_C"],
+        air=channels["air_temp_C"],
+        payload=channels["payload_kg"],
+    )
+    real = body.real(parameters, plan.hidden, load, settles=False)
+    return real.poses(circumstances, real.home(len(extension)))
+
+
+def _last_step(extension: Array, smallest: float) -> Array:
+    """Last change of each actuator up to every row that was one, (R, n); 0 before the first."""
+    change = np.diff(extension, axis=0, prepend=extension[:1])
+    rows = np.arange(len(extension))[:, None]
+    last = np.maximum.accumulate(np.where(np.abs(change) > smallest, rows, 0), axis=0)
+    return np.asarray(np.take_along_axis(change, last, axis=0))
