@@ -25,6 +25,10 @@ from calib.mechanism.solve import forward
 from calib.model.prediction import Linearised, Model, State
 
 MAX_STEPS = 30
+LEAST_FALL = 1e-3
+"""Fall of chi-square below which nothing is gained by a better step."""
+ENOUGH = 0.8
+"""Part of a step at which the cost is least, above which the whole step is taken."""
 MAJORITY = 0.3
 """Least part of a run's readings that must stand where the machine's nests can be."""
 TOLERANCE = 1e-6
@@ -296,7 +300,10 @@ def _optimise(
             trial = _attempt(model, linear, step)
             if trial is not None:
                 reached = _cost(model, trial, accepted, precision)
-                if reached <= cost * (1.0 + 1e-12) or fall < 1e-3:
+                trial, reached = _shortened(
+                    model, linear, step, (trial, reached, cost - reached, fall), accepted, precision
+                )
+                if reached <= cost * (1.0 + 1e-12) or fall < LEAST_FALL:
                     break
             damping = max(10.0 * damping, 1e-4)
             if damping > 1e8:
@@ -310,6 +317,30 @@ def _optimise(
         f"the fit has not converged in {MAX_STEPS} steps",
         remedy="Check that the run belongs to this machine; see its residuals",
     )
+
+
+def _shortened(
+    model: Model,
+    linear: Linearised,
+    step: Array,
+    tried: tuple[Linearised, float, float, float],
+    accepted: BoolArray,
+    precision: Array,
+) -> tuple[Linearised, float]:
+    """Take less of a step that overshoots: a period may zigzag about its optimum for ever.
+
+    Along the step the cost is c - 2 F t + a t^2 with F the predicted fall; a follows from the cost
+    at t = 1, and the minimum is at F / a.
+    """
+    trial, reached, fallen, fall = tried
+    best = fall / max(2.0 * fall - fallen, 1e-300)
+    if best > ENOUGH or fall < LEAST_FALL:
+        return trial, reached
+    shorter = _attempt(model, linear, best * step)
+    if shorter is None:
+        return trial, reached
+    cost = _cost(model, shorter, accepted, precision)
+    return (shorter, cost) if cost < reached else (trial, reached)
 
 
 def _attempt(model: Model, linear: Linearised, step: Array) -> Linearised | None:
