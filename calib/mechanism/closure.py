@@ -111,6 +111,14 @@ def _turn(columns: list[Numbers], axis: int, angle: Numbers) -> list[Numbers]:
     return turned
 
 
+def _quarter_turns(columns: list[Numbers], axis: int, count: int) -> list[Numbers]:
+    k, l = (axis + 1) % 3, (axis + 2) % 3  # noqa: E741 - k, l follow the axis cyclically
+    turned = list(columns)
+    for _ in range(count):
+        turned[k], turned[l] = turned[l], -turned[k]
+    return turned
+
+
 def _needs_screw(element: ArrayElement) -> bool:
     return bool(element.terms) or element.compliance is not None
 
@@ -131,9 +139,11 @@ def sweep(
             value: Numbers | None = strain[group.compliant.index(k)]
         else:
             value = element_value(element, parameters, extension, state.passive)
-        if value is None:
+        if value is None or (value.shape[-1] == 1 and not np.any(value)):
             continue
-        if element.turns:
+        if element.quarters is not None:
+            columns = _quarter_turns(columns, element.axis, element.quarters)
+        elif element.turns:
             columns = _turn(columns, element.axis, value)
         else:
             point = point + columns[element.axis] * value

@@ -29,6 +29,16 @@ class ArrayElement:
     terms: tuple[ArrayTerm, ...]
     compliance: Array | None
 
+    @cached_property
+    def quarters(self) -> int | None:
+        """How many quarter turns a fixed rotation makes, in all limbs alike; None for others."""
+        if not self.turns or self.terms or self.constant is None:
+            return None
+        turns = np.round(self.constant / (np.pi / 2.0))
+        exact = np.all(np.abs(self.constant - turns * (np.pi / 2.0)) < 1e-15)
+        alike = np.all(turns % 4 == turns.flat[0] % 4)
+        return int(turns.flat[0]) % 4 if exact and alike else None
+
 
 @dataclass(frozen=True, eq=False)
 class Group:
