@@ -15,6 +15,8 @@ from app.compare_charts import write_charts
 from calib.discover.compare_report import compare_report
 from calib.discover.run_compare import compare_fit
 from calib.discover.run_discovery import SEED
+from calib.discover.run_terms import Proposal
+from calib.discover.run_terms import propose as propose_terms
 
 SHOWN = 6
 WIDTH = 13
@@ -28,27 +30,63 @@ WIDTH = 13
     type=click.Path(path_type=Path, file_okay=False),
     help="Draw figures (structure, workspace, actuators) into this folder.",
 )
+@click.option(
+    "--propose",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Look for terms that would explain what is left; write them as effect files (TOML).",
+)
 @answer.json_option
 def command(
     runs: tuple[str, ...],
     add: tuple[str, ...],
     model: Path | None,
     out: Path | None,
+    propose: Path | None,
     as_json: bool,
 ) -> None:
     """Compare the fitted model with the readings of RUN...
 
     Repeatability first: what does not repeat, no effect can explain. Then what the residual
     depends on, the variable with the most structure first, and the actuators and poses that are
-    off. Nothing is written but the figures asked for with --out.
+    off. Nothing is written but the figures asked for with --out and the effect files asked for
+    with --propose, which --add takes.
     """
     refit, begin = load_refitter(runs, add, model)
-    found = compare_fit(refit.fit(begin), np.random.default_rng(SEED))
+    fitted = refit.fit(begin)
+    found = compare_fit(fitted, np.random.default_rng(SEED))
     if out is not None:
         for path in write_charts(found, out):
             answer.say(f"drawn {path}")
     report = compare_report(found)
+    if propose is not None:
+        answer.say("looking for terms ...")
+        terms = propose_terms(fitted, np.random.default_rng(SEED))
+        report["proposed"] = _proposed(terms, propose)
     answer.show(report, as_json, words(report))
+
+
+def _proposed(terms: list[Proposal], path: Path) -> list[dict[str, Any]]:
+    """Write every stable term: FILE, FILE-2 ...; what was found, stable or not, as plain data."""
+    listed = []
+    stable = 0
+    for term in terms:
+        file = None
+        if term.selected.stable:
+            stable += 1
+            name = path.name if stable == 1 else f"{path.stem}-{stable}{path.suffix}"
+            file = path.with_name(name)
+            file.write_text(term.text, encoding="utf-8")
+            answer.say(f"written {file}")
+        listed.append(
+            {
+                "formula": term.formula,
+                "explains_um": 1000.0 * term.explains_mm,
+                "log_evidence": term.selected.log_evidence,
+                "stability": term.selected.frequency,
+                "file": None if file is None else str(file),
+            }
+        )
+    return listed
 
 
 def words(report: dict[str, Any]) -> str:
@@ -81,9 +119,27 @@ def words(report: dict[str, Any]) -> str:
             "  "
             + ", ".join(f"{a['actuator']} {a['rms']:.2f} {a['unit']}" for a in report["actuators"])
         )
+    if "proposed" in report:
+        lines += ["", *_terms(report["proposed"])]
     for bad in report["bad_readings"]:
         lines.append(f"excluded: line {bad['line']}: {bad['why']}")
     return "\n".join([*lines, "", report["advice"]])
+
+
+def _terms(proposed: list[dict[str, Any]]) -> list[str]:
+    """Say which terms were found and how sure that is."""
+    if not proposed:
+        return ["No formula of the library would explain anything of what is left."]
+    rows = [
+        (
+            one["formula"],
+            f"{one['explains_um']:.2f} um",
+            f"{100 * one['stability']:.0f} %",
+            one["file"] or "not stable, not written",
+        )
+        for one in proposed
+    ]
+    return [answer.table(("proposed term", "explains", "found in halves", "file"), rows)]
 
 
 def _repeats(what: str, repeats: dict[str, Any] | None) -> str:

@@ -252,7 +252,7 @@ def _explain(
         if others := rivals(judged.scores, best, questioned, signatures):
             groups.append((best, *others))
         chosen.append((best, evidences[best]))
-        columns, precision = _joining(judged.scores, best)
+        columns, precision = joining(judged.scores, best)
         judged = _judge(
             judged.scores.without(columns, precision, rng), len(judged.effects), quadratic
         )
@@ -288,7 +288,7 @@ def _signature(scores: Scores, index: int) -> tuple[Array, int, int]:
     return beta @ candidate.columns[trial, list(subset)], number, trial
 
 
-def _joining(scores: Scores, index: int) -> tuple[Array, Array]:
+def joining(scores: Scores, index: int) -> tuple[Array, Array]:
     """Columns and prior precision with which a candidate joins the linearised fit.
 
     The whole group at its best trial and, along a scanned unknown, first and second differences

@@ -78,6 +78,11 @@ class LinearProblem:
             linalg.solve_triangular(factor, scale[:, None] * self.jacobian, lower=True)
         )
 
+    def whitened_step(self, slope: Array) -> Array:
+        """L^-1 slope (p,): a step of the fitted unknowns moves the prediction by G^T times it."""
+        factor, scale = self._factor
+        return np.asarray(linalg.solve_triangular(factor, scale * slope, lower=True))
+
     @cached_property
     def trace(self) -> float:
         """tr M = R - tr H, the degrees of freedom left."""

@@ -14,6 +14,7 @@ from app.verbs.compare import command
 from calib.discover import Carrier, Variable, pure_error
 from calib.discover.compare import compare_structure
 from calib.discover.run_compare import compare_fit, pose_residuals
+from calib.effects.operator import effect_from_text
 from calib.identify import fit
 from calib.model import Model
 from calib.runs.stack import stack
@@ -136,3 +137,15 @@ def test_effect_that_is_added_falls_silent():
     )
     report = json.loads(answer.stdout)
     assert "direction" not in [one["channel"] for one in report["structure"] if one["significant"]]
+
+
+def test_proposed_terms_are_written_as_effect_files(tmp_path):
+    file = tmp_path / "own.toml"
+    answer = CliRunner().invoke(
+        command, [str(RUNS / "backlash-leg-3"), "--json", "--propose", str(file)]
+    )
+    report = json.loads(answer.stdout)
+    first = report["proposed"][0]
+    assert first["formula"] == "a * direction"
+    assert first["stability"] > 0.9
+    assert effect_from_text(file.read_text(), "own.toml").id == "found-1"

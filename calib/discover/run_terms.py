@@ -1,0 +1,197 @@
+"""A library of formulas for a run, and the proposal of an operator's effect from it.
+
+Every formula of the library is an operator's effect (``calib.effects.operator``), so that what is
+proposed can be saved, read and refined by hand. Variables are centred and scaled in the formulas
+themselves where that keeps numbers readable.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib.arrays import IntArray
+from calib.discover.run_problem import effect_candidates, effect_columns, problem_of
+from calib.discover.terms import Selected, select_terms
+from calib.effects.formula_effect import OperatorEffect
+from calib.effects.operator import effect_from_text
+from calib.identify.fitting import Fit
+
+PERIODS = 48
+
+
+@dataclass(frozen=True)
+class Formula:
+    """One entry of the library.
+
+    ``text`` holds the unknowns as ``{a}``, ``{b}`` ... with ``units``; ``searched`` is a nonlinear
+    unknown as (name, unit, from, to) or None.
+    """
+
+    text: tuple[str, ...]
+    units: tuple[str, ...]
+    acts_on: str
+    shared: bool
+    searched: tuple[str, str, float, float] | None = None
+
+    def table(self, identifier: str, says: str, letters: Sequence[str]) -> str:
+        """The formula as the text of an effect file."""
+        names = dict(zip("abc", letters, strict=False))
+        parts = [f'"{one.format(**names)}"' for one in self.text]
+        unknowns = [f'{x} = "{unit}"' for x, unit in zip(letters, self.units, strict=False)]
+        if self.searched is not None:
+            name, unit, low, high = self.searched
+            unknowns.append(
+                f'{name} = {{ unit = "{unit}", from = {low:.6g}, to = {high:.6g}, '
+                f"steps = {PERIODS} }}"
+            )
+        lines = [
+            "[effect]",
+            f'id = "{identifier}"',
+            f'says = "{says}"',
+            f'acts_on = "{self.acts_on}"',
+            f"expression = {parts[0] if len(parts) == 1 else '[' + ', '.join(parts) + ']'}",
+            f"unknowns = {{ {', '.join(unknowns)} }}",
+        ]
+        return "\n".join([*lines, *(["shared = true"] if self.shared else [])]) + "\n"
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A term for what is left, as an operator's effect file.
+
+    Attributes
+    ----------
+    formula : str
+        For people.
+    text : str
+        The effect file.
+    selected : Selected
+        Evidence and stability.
+    explains_mm : float
+        RMS over readings of what it explains.
+    """
+
+    formula: str
+    text: str
+    selected: Selected
+    explains_mm: float
+
+
+def library(fit: Fit) -> list[Formula]:
+    """Formulas in actuator space (one for all, or one each) and in point space."""
+    rows = fit.model.rows
+    unit = rows.machine.actuators[0].unit if rows.machine.actuators else "mm"
+    own = [
+        (("{a} * s**2",), (f"1/{unit}",)),
+        (("{a} * s**3",), (f"1/{unit}^2",)),
+        (("{a} * abs(s)",), ("1",)),
+        (("{a} * direction",), (unit,)),
+        (("{a} * s * direction",), ("1",)),
+        (("{a} * step",), ("1",)),
+        (("{a} * s**2 * direction",), (f"1/{unit}",)),
+    ]
+    found = [
+        Formula(text, units, "actuator", shared) for text, units in own for shared in (True, False)
+    ]
+    for name, low, high in _varying(fit):
+        centre = f"({name} - {0.5 * (low + high):.6g})"
+        found += _of_channel(centre, name, unit)
+    found += _of_time(fit, unit)
+    for text in ("range**2", "range**3", "elevation", "elevation**2", "sin(2*azimuth)"):
+        found.append(Formula((f"{{a}} * {text}",), ("mm",), "point", True))
+    waves = ("sin(azimuth)", "cos(azimuth)", "sin(2*azimuth)", "cos(2*azimuth)", "elevation**2")
+    found += [_along(one, "mm") for one in waves]
+    return found
+
+
+def _along(shape: str, unit: str) -> Formula:
+    """A displacement of the point in any fixed direction of the tracker frame."""
+    text = tuple(f"{{{x}}} * {shape}" for x in "abc")
+    return Formula(text, (unit,) * 3, "point", True)
+
+
+def _varying(fit: Fit) -> list[tuple[str, float, float]]:
+    """Channels that vary, with their range."""
+    found = []
+    for name, values in fit.model.rows.channels.items():
+        known = values[fit.accepted & np.isfinite(values)]
+        if known.size and np.ptp(known) > 1e-9 * max(1.0, float(np.abs(known).max())):
+            found.append((name, float(known.min()), float(known.max())))
+    return found
+
+
+def _of_channel(centre: str, name: str, unit: str) -> list[Formula]:
+    per = f"{unit} per unit of {name}"
+    found = [
+        Formula((text,), (per,), "actuator", shared)
+        for text in (f"{{a}} * {centre}", f"{{a}} * {centre} * s", f"{{a}} * {centre}**2")
+        for shared in (True, False)
+    ]
+    return [*found, _along(centre, f"mm per unit of {name}")]
+
+
+def _of_time(fit: Fit, unit: str) -> list[Formula]:
+    """Waves and warming-up in time, where the run lasts long enough to see them."""
+    time = np.unique(fit.model.rows.time_s[fit.accepted])
+    span = float(np.ptp(time))
+    if time.size < 12 or span <= 0.0:
+        return []
+    low = max(4.0 * span / time.size, span / (0.5 * PERIODS))
+    period = ("p", "s", low, span)
+    wave = "{a} * sin(2*pi*t/p) + {b} * cos(2*pi*t/p)"
+    decay = ("tau", "s", span / 20.0, span)
+    found = [Formula((wave,), (unit, unit), "actuator", shared, period) for shared in (True, False)]
+    found += [
+        Formula(("{a} * exp(-t/tau)",), (unit,), "actuator", shared, decay)
+        for shared in (True, False)
+    ]
+    for axis in range(3):
+        along = ["0", "0", "0"]
+        along[axis] = wave
+        found.append(Formula(tuple(along), ("mm", "mm"), "point", True, period))
+    return found
+
+
+def propose(fit: Fit, rng: np.random.Generator) -> list[Proposal]:
+    """Propose terms for what a fit leaves, in the order in which they are called for."""
+    formulas = library(fit)
+    effects: list[OperatorEffect] = []
+    kept: list[Formula] = []
+    for number, formula in enumerate(formulas):
+        effect = effect_from_text(formula.table(f"term-{number}", "a term", "abc"), "library")
+        if not effect.unavailable(fit.model.rows):
+            effects.append(effect)
+            kept.append(formula)
+    problem = problem_of(fit)
+    candidates = effect_candidates(fit, problem, effect_columns(fit, effects))
+    found = select_terms(problem, candidates, _poses(fit), rng)
+    return [_proposal(fit, kept[one.index], number, one) for number, one in enumerate(found)]
+
+
+def _poses(fit: Fit) -> IntArray:
+    """Number of the pose of each component (3 A,), -1 for reference readings."""
+    rows = fit.model.rows
+    names = [
+        (int(run), name) if on else None
+        for run, name, on in zip(rows.run, rows.pose_name, rows.on_platform, strict=True)
+    ]
+    numbers = {name: k for k, name in enumerate(dict.fromkeys(n for n in names if n is not None))}
+    one = np.array([-1 if name is None else numbers[name] for name in names])[fit.accepted]
+    return np.tile(one.astype(np.intp), 3)
+
+
+def _proposal(fit: Fit, formula: Formula, number: int, found: Selected) -> Proposal:
+    factors = np.linalg.inv(np.moveaxis(fit.model.rows.whitener[:, :, fit.accepted], -1, 0))
+    moved = np.einsum("nij,jn->in", factors, found.fitted.reshape(3, -1))
+    said = ", ".join(one.format(a="a", b="b", c="c") for one in formula.text)
+    says = f"proposed from the residual: {said}"
+    if found.trial:
+        name = formula.searched[0] if formula.searched else "x"
+        said += f" with {name} near {found.trial[0]:.4g}"
+    return Proposal(
+        formula=said,
+        text=formula.table(f"found-{number + 1}", says, "abc"),
+        selected=found,
+        explains_mm=float(np.sqrt(np.mean(np.sum(moved**2, axis=0)))),
+    )
