@@ -85,12 +85,12 @@ class ApplyFace(Face):
                           else "Nothing is fitted yet: go to Fit (3)")  # fmt: skip
             return
         names = ("old", "new", "change", "sigmas")
-        table.add_columns("parameter", *(Text(name, justify="right") for name in names))
+        table.add_columns("name", *(Text(name, justify="right") for name in names))
         for change in comparison.proposal.changes:
             digits = 4 if change.unit == "mm" else 6
             cells = (
                 f"{change.old:10.{digits}f}", f"{change.new:10.{digits}f}",
-                f"{change.new - change.old:+9.{digits}f}", f"{change.in_sigmas:+7.1f}",
+                f"{change.new - change.old:+8.{digits}f}", f"{change.in_sigmas:+7.1f}",
             )  # fmt: skip
             style = "" if change.identified else "dim"
             table.add_row(

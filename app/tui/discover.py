@@ -77,7 +77,7 @@ class DiscoverFace(Face):
         if drawn == self._drawn:
             return
         self._drawn = drawn
-        self.query_one("#stairs", Static).update(stairs_text(search, 26 if self.wide else 8))
+        self.query_one("#stairs", Static).update(stairs_text(search, 26 if self.wide else 7))
         self.query_one("#fails", Static).update(fails_text(view, self._shown, self.wide))
         self.query_one("#advice", Static).update(advice_text(view))
         self.query_one("#found", Static).update(found_text(view))
@@ -164,7 +164,8 @@ def stairs_text(search: Search | None, room: int) -> Content:
         )
     shown = search.stairs[-STAIRS:]
     top = max(stair.rms_um for stair in search.stairs)
-    lines = [Content.from_markup("[dim]                 RMS held out  ░ noise █ left[/]")]
+    legend = "  ░ noise █ left" if room > 20 else ""
+    lines = [Content.from_markup("[dim]$head[/]", head=f"{'RMS':>20} held out{legend}")]
     for number, stair in enumerate(shown):
         line = f"{_cut(stair.did, 14):<14}{stair.rms_um:6.2f}{_um(stair.holdout_um)} "
         last = number == len(shown) - 1

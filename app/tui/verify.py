@@ -164,15 +164,14 @@ def summary_text(before: Verified | None, after: Verified | None) -> Content:
     last = after or before
     assert last is not None
     found = last.found
-    lines.append(Content(f"tracker noise alone {found.noise_peak_um:9.1f}{'':>9}"
-                         f"{found.noise_peak_deg:11.4f}"))  # fmt: skip
-    lines.append(
-        Content.from_markup(
-            "[dim]Han et al. 2020     $um         $deg   (after, measured)[/]",
-            um=f"{PAPER['position_peak_um']:9.1f}", deg=f"{PAPER['orientation_peak_deg']:9.4f}",
-        )
-    )  # fmt: skip
+    lines.append(Content(_row("tracker noise alone", found.noise_peak_um, found.noise_peak_deg)))
+    paper = _row("Han et al. 2020", PAPER["position_peak_um"], PAPER["orientation_peak_deg"])
+    lines.append(Content.assemble((f"{paper}            measured, after", "dim")))
     return Content("\n").join(lines)
+
+
+def _row(name: str, peak_um: float, peak_deg: float) -> str:
+    return f"{name:<20}{peak_um:9.1f}{'':9}{peak_deg:11.4f}"
 
 
 def _line(name: str, found: Summary, *, bold: bool = False) -> Content:

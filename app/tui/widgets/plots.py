@@ -133,7 +133,8 @@ class BinPlot(QuietPlot):
         over = structure["channel"]
         if structure["period"]:
             over += f" modulo {structure['period']:.3g}"
-        self.border_title = f"{structure['shows_in']}, {structure['unit']}, over {over}"
+        unit = structure["unit"].replace("um", "µm").replace("urad", "µrad")
+        self.border_title = f"{structure['shows_in']}, {unit}, over {over}"
 
 
 def thin(x: Array, y: Array, most: int) -> tuple[Array, Array]:
