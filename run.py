@@ -44,8 +44,18 @@ def ensure_environment(extra: str) -> None:
     target = f"{ROOT}[{extra}]" if extra else str(ROOT)
     constraints = str(ROOT / "constraints.txt")
     subprocess.run(
-        [PYTHON, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-        + ["--constraint", constraints, "--editable", target],
+        [
+            PYTHON,
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--disable-pip-version-check",
+            "--constraint",
+            constraints,
+            "--editable",
+            target,
+        ],
         check=True,
     )
     stamp.write_text(wanted)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from app.machine_files import read_text
-from app.poses_file import read_poses
+from app.pose_table import read_poses
 from app.session.plan import Pose
 from app.toml_reader import TableReader
 from calib.arrays import Array

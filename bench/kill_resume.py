@@ -16,7 +16,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from app.poses_file import poses_text
+from app.pose_table import poses_text
 from app.run_files import read_run
 from app.session.folder import JOURNAL, read_folder
 from app.session.journal import Journal

@@ -1,0 +1,1 @@
+"""Templates of pages, read as resources."""

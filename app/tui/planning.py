@@ -14,7 +14,7 @@ from textual.content import Content
 from textual.widgets import Button, Checkbox, Input, RadioButton, RadioSet, Static
 
 from app.pose_files import full_poses, read_pose_file
-from app.poses_file import read_poses
+from app.pose_table import read_poses
 from app.session import Plan, PlanOptions, measure_plan
 from app.session.plan import Pose
 from app.session.plans import Order

@@ -9,7 +9,7 @@ import numpy as np
 from app import answer
 from app.machine_files import load_machine
 from app.pose_files import full_poses, nest_matrix, render_design, render_pose_file
-from app.poses_file import poses_text
+from app.pose_table import poses_text
 from app.site import load_site
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
