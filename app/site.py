@@ -103,10 +103,10 @@ class Limits:
     base_fit_mm: float = 0.050
     """Largest RMS of the base nests against their drawing."""
     two_face_mm: float = 0.100
-    air_temp_C: tuple[float, ...] = (10.0, 35.0)  # noqa: N815 - the channel's own name
+    air_temp_C: tuple[float, ...] = (10.0, 35.0)
     warm_up_s: float = 60.0
     """How long the channels are watched before the run."""
-    warm_up_K_per_min: float = 0.2  # noqa: N815 - a unit
+    warm_up_K_per_min: float = 0.2
     move_timeout_s: float = 120.0
     """Machine seconds that a move may take."""
 
