@@ -50,7 +50,9 @@ class Scores:
     residuals : (R, 1 + draws)
         Observed residual first.
     norms : list of (T, k)
-        Norm of each column before projection; ``unit`` columns are divided by it.
+        Norm of each column before projection.
+    units : list of (T, k, R)
+        Columns divided by their norms.
     scores : list of (T, k, 1 + draws)
         Unit columns times residuals.
     weights : list of (T, k, k)
@@ -61,6 +63,7 @@ class Scores:
     candidates: Sequence[Candidate]
     residuals: Array
     norms: list[Array]
+    units: list[Array]
     scores: list[Array]
     weights: list[Array]
     remembered: dict[int, tuple[float, list[Array]]] = field(default_factory=dict, repr=False)
@@ -112,13 +115,6 @@ class Scores:
                 left.append(float(np.min((self.squares[0] - chi2) / dof)))
         return float(np.sqrt(max(1.0, min(left))))
 
-    def unit(self, index: int) -> Array:
-        """Unit columns (T, k, R) of a candidate."""
-        norm = self.norms[index]
-        return np.asarray(
-            self.candidates[index].columns / np.where(norm > 0.0, norm, 1.0)[:, :, None]
-        )
-
     def without(self, columns: Array, precision: Array, rng: np.random.Generator) -> "Scores":
         """Scores after ``columns`` (k, R) with prior ``precision`` (k,) have joined the fit.
 
@@ -138,7 +134,8 @@ class Scores:
         pulled = half @ (columns @ self.residuals + prior)
         scores, weights = [], []
         for index, old in enumerate(self.scores):
-            cross = self.unit(index) @ taken.T
+            unit = self.units[index]
+            cross = (unit.reshape(-1, unit.shape[2]) @ taken.T).reshape(*unit.shape[:2], -1)
             scores.append(old - cross @ pulled)
             weights.append(self.weights[index] - cross @ np.swapaxes(cross, 1, 2))
         return Scores(
@@ -146,6 +143,7 @@ class Scores:
             candidates=self.candidates,
             residuals=self.residuals - taken.T @ pulled,
             norms=self.norms,
+            units=self.units,
             scores=scores,
             weights=weights,
         )
@@ -170,16 +168,17 @@ def score(
     residuals = np.concatenate(
         [problem.residual[:, None], problem.null_residuals(draws, rng)], axis=1
     )
-    norms, scores, weights = [], [], []
+    norms, units, scores, weights = [], [], [], []
     for candidate in candidates:
         norm = np.sqrt(np.einsum("tkr,tkr->tk", candidate.columns, candidate.columns))
         unit = candidate.columns / np.where(norm > 0.0, norm, 1.0)[:, :, None]
         flat = unit.reshape(-1, problem.rows)
         absorbed = (flat @ problem.absorbed.T).reshape(*norm.shape, -1)
         norms.append(norm)
+        units.append(unit)
         scores.append((flat @ residuals).reshape(*norm.shape, -1))
         weights.append(unit @ np.swapaxes(unit, 1, 2) - absorbed @ np.swapaxes(absorbed, 1, 2))
-    return Scores(problem, list(candidates), residuals, norms, scores, weights)
+    return Scores(problem, list(candidates), residuals, norms, units, scores, weights)
 
 
 def _weigh(weight: Array, subset: tuple[int, ...]) -> Weighing:
