@@ -1,0 +1,56 @@
+"""What ``ERR?`` answers, in words, with what to do about it."""
+
+from drivers.errors import DeviceError, DeviceFault, DriveFault, Refused
+
+STOPPED, UNKNOWN_PARAMETER, MOTION_ERROR = 10, 54, 1024
+
+WORDS = {
+    1: ("syntax error", "Check that this controller speaks GCS 2.0."),
+    2: ("unknown command", "Check that this is the controller of the site file."),
+    5: (
+        "an axis is not enabled or does not know its reference",
+        "Enable the machine; home the actuators that lost their reference.",
+    ),
+    7: (
+        "a target is outside the controller's limits",
+        "Choose a pose within the actuators' travel; check the parameters if it should be.",
+    ),
+    8: ("velocity outside limits", ""),
+    STOPPED: (
+        "the motion was stopped",
+        "Enable the machine and command the pose again.",
+    ),
+    15: ("there is no such axis or item", "Check the axes in the site file."),
+    17: ("a value is out of range", "Check the value that was to be written."),
+    22: ("an axis is named twice", "Check the axes in the site file."),
+    23: ("these axes cannot be moved together", ""),
+    25: ("a value is not a number", ""),
+    UNKNOWN_PARAMETER: (
+        "unknown parameter",
+        "Check that machine file and controller belong together.",
+    ),
+    56: ("wrong password", "Check the passwords in the site file."),
+    60: ("the parameter is protected", "Check the command level's password in the site file."),
+    64: ("the parameter is read only", ""),
+    93: ("not allowed while an axis moves", "Stop the machine first."),
+    95: ("not allowed while servos are on", "Disable motion first, then try again."),
+    305: ("its memory cannot be written", "The old values are still stored."),
+    333: ("hardware error", "Restore the snapshot, switch the controller off and on, try again."),
+    MOTION_ERROR: (
+        "a servo switched itself off",
+        "Remove the cause, clear the faults and enable the machine again.",
+    ),
+    4001: ("its memory cannot be written", "The old values are still stored."),
+    4002: ("its memory cannot be read: it works with its defaults", "Bring a known set back."),
+}
+
+
+def refusal(code: int, command: str, device: str) -> DeviceError:
+    """Return the exception for a command that ended with ``code``."""
+    words, remedy = WORDS.get(code, ("unknown error", "See the controller's manual."))
+    if code == STOPPED:
+        return DeviceFault(words, device=device, remedy=remedy)
+    if code == MOTION_ERROR:
+        return DriveFault(f"{words} (GCS error {code})", device=device, remedy=remedy)
+    what = f"refuses {command!r}: {words} (GCS error {code})"
+    return Refused(what, device=device, remedy=remedy, code=code)

@@ -1,0 +1,57 @@
+"""What the controller's ``HPA?`` says about its parameters.
+
+The identifiers are this project's own (docs/protocols/gcs.md); their meaning is read from the
+controller: an entry of group ``limb`` named ``h`` with three items holds limb1.h, limb2.h and
+limb3.h; entries of group ``channel`` are state readings.
+"""
+
+import re
+from dataclasses import dataclass
+
+from drivers.errors import ProtocolError
+
+CRC_IN_USE, CRC_STORED, WATCHDOG = 0x7F030001, 0x7F030002, 0x7F030003
+LIMB, CHANNEL = "limb", "channel"
+Address = tuple[str, int]
+"""Item and identifier."""
+
+_ENTRY = re.compile(r"0x([0-9A-Fa-f]+)=\s*(\d+)\s+(\d+)\s+(\w+)\t([^\t]+)\t([^\t]+)")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where things are: name -> (item, identifier).
+
+    ``parameters`` are in the order of the checksum: limb by limb, identifiers in turn.
+    """
+
+    parameters: dict[str, Address]
+    channels: dict[str, Address]
+    watchdog: bool
+
+
+def read_layout(lines: list[str], device: str) -> Layout:
+    """Read the answer to ``HPA?``; raises ProtocolError if it lists no kinematic parameters."""
+    parameters: dict[str, Address] = {}
+    channels: dict[str, Address] = {}
+    numbers = set()
+    for line in lines:
+        entry = _ENTRY.match(line)
+        if entry is None:
+            continue
+        number, items = int(entry[1], 16), int(entry[3])
+        group, says = entry[5].strip(), entry[6].strip()
+        numbers.add(number)
+        if group == LIMB:
+            for item in range(1, items + 1):
+                parameters[f"{LIMB}{item}.{says}"] = (str(item), number)
+        elif group == CHANNEL:
+            channels[says] = ("1", number)
+    if not parameters or CRC_IN_USE not in numbers:
+        raise ProtocolError(
+            "lists no kinematic parameters (HPA?)",
+            device=device,
+            remedy="Check that this is the controller of the site file, and its firmware.",
+        )
+    ordered = dict(sorted(parameters.items(), key=lambda entry: entry[1]))
+    return Layout(ordered, channels, WATCHDOG in numbers)
