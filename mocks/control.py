@@ -14,14 +14,14 @@ exchange            first, second: two SMRs change places
 break-beam          for_s (machine s; without: until restore-beam), status
 restore-beam
 break-next-dwell    at = fraction of the dwell, for_s
-stall / unstall     leg = 1..6
+stall / unstall     leg = 1, 2, .. (an actuator)
 fault / clear       name (list in mocks/faults.py); clear without a name ends all
 faults              answers what is wrong now
 payload             kg
 temperature         structure_C
 jump-tracker        x, y, z (mm), rx, ry, rz (rad)
 tracker-error       status: an Error packet that nobody asked for
-reset-tcp           of = "tracker" | "can"
+reset-tcp           of = "tracker" | "controller"
 time                answers machine time and scale
 truth               settled = false: answers true pose, parameters, frame (for judges)
 ==================  ==================================================================
@@ -56,8 +56,10 @@ class Cuttable(Protocol):
 class Hands:
     """Carries out the commands of the control socket; raises ValueError for what it cannot."""
 
-    def __init__(self, world: World, tracker: TrackerServer, can: Cuttable | None = None) -> None:
-        self._world, self._tracker, self._can = world, tracker, can
+    def __init__(
+        self, world: World, tracker: TrackerServer, controller: Cuttable | None = None
+    ) -> None:
+        self._world, self._tracker, self._controller = world, tracker, controller
         self._instrument = tracker.instrument
         self._commands: dict[str, Callable[[Arguments], Any]] = {
             "carry": self._carry,
@@ -159,10 +161,10 @@ class Hands:
         of = a.get("of", "tracker")
         if of == "tracker":
             self._tracker.reset_connection()
-        elif of == "can" and self._can is not None:
-            self._can.cut(reset=True)
+        elif of == "controller" and self._controller is not None:
+            self._controller.cut(reset=True)
         else:
-            raise ValueError(f'of must be "tracker" or "can", got {of!r}')
+            raise ValueError(f'of must be "tracker" or "controller", got {of!r}')
 
     def _truth(self, a: Arguments) -> dict[str, Any]:
         world = self._world

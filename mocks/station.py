@@ -7,7 +7,9 @@ its standard input. With ``--json`` the one line on standard output is::
      "tracker": "127.0.0.1:PORT", "control": "127.0.0.1:PORT", "scale": 120.0,
      "site": {...}, "site_file": "..." or null}
 
-``site`` is the content of a site file (pkm-site/1) for this station.
+A machine whose controller speaks GCS has ``gcs`` (``socket://127.0.0.1:PORT``) and ``serial_port``
+(the name of a pseudo-terminal, or "") instead of ``can``. ``site`` is the content of a site file
+(pkm-site/1) for this station.
 """
 
 import argparse
@@ -28,6 +30,7 @@ import tomli_w
 from mocks.canopen.server import CanopenStation
 from mocks.clock import ScaledClock
 from mocks.control import ControlServer, Hands
+from mocks.gcs.server import GcsStation
 from mocks.physics.bodies import BODIES
 from mocks.physics.hidden import Hidden
 from mocks.physics.truth import draw_parameters, machine_file, read_parameters
@@ -36,11 +39,13 @@ from mocks.tracker.server import TrackerServer
 from mocks.world import World, WorldPlan
 
 CONTROLLER_NODE = 10
+ON_GCS = ("tripod",)
+"""Machines whose controller speaks GCS; the others are on CANopen."""
 FRAME_ERROR_MM, FRAME_ERROR_RAD = 3.0, 0.003
 
 
 class MockStation:
-    """World, CAN bus, tracker and control socket of one mock machine."""
+    """World, motion controller, tracker and control socket of one mock machine."""
 
     def __init__(
         self,
@@ -54,13 +59,17 @@ class MockStation:
         self.clock = clock
         self.serial = serial if serial is not None else _serial(nvm)
         host = "127.0.0.1"
-        self.can = CanopenStation(world, nvm, host, ports[0], self.serial)
+        self.controller: CanopenStation | GcsStation = (
+            GcsStation(world, nvm, host, ports[0], True, self.serial)
+            if world.machine.name in ON_GCS
+            else CanopenStation(world, nvm, host, ports[0], self.serial)
+        )
         self.tracker = TrackerServer(world, clock, host, ports[1])
-        self.control = ControlServer(Hands(world, self.tracker, self.can), host, ports[2])
+        self.control = ControlServer(Hands(world, self.tracker, self.controller), host, ports[2])
 
     async def start(self) -> None:
         """Power on."""
-        await asyncio.to_thread(self.can.start)
+        await asyncio.to_thread(self.controller.start)
         await self.tracker.start()
         await self.control.start()
 
@@ -68,12 +77,12 @@ class MockStation:
         """Power off."""
         await self.control.stop()
         await self.tracker.stop()
-        await asyncio.to_thread(self.can.stop)
+        await asyncio.to_thread(self.controller.stop)
 
     @property
     def channel(self) -> str:
-        """The CAN adapter as python-can names it."""
-        host, port = self.can.address
+        """The controller on TCP, as python-can names an adapter and pyserial a port."""
+        host, port = self.controller.address
         return f"socket://{host}:{port}"
 
     def announcement(self, site_file: Path | None = None) -> dict[str, Any]:
@@ -81,7 +90,7 @@ class MockStation:
         return {
             "format": "pkm-mock/1",
             "machine": self.world.machine.name,
-            "can": self.channel,
+            **self._lines(),
             "tracker": self.tracker.address,
             "control": self.control.address,
             "scale": self.clock.scale,
@@ -89,16 +98,27 @@ class MockStation:
             "site_file": None if site_file is None else str(site_file),
         }
 
+    def _lines(self) -> dict[str, str]:
+        """Where the controller can be reached."""
+        if isinstance(self.controller, GcsStation):
+            return {"gcs": self.channel, "serial_port": self.controller.pty_path}
+        return {"can": self.channel}
+
+    def _controller_site(self) -> dict[str, Any]:
+        if isinstance(self.controller, GcsStation):
+            return {"kind": "gcs", "port": self.controller.pty_path or self.channel}
+        return {
+            "kind": "canopen", "interface": "slcan", "channel": self.channel,
+            "node": CONTROLLER_NODE,
+        }  # fmt: skip
+
     def site(self) -> dict[str, Any]:
         """A site file for this station, without its ``format``."""
         plan, around, load = self.world.plan, self.world.around, self.world.load
         return {
             "title": f"mock {self.world.machine.name}, seed {plan.seed}",
             "machine": self.world.machine.name,
-            "controller": {
-                "kind": "canopen", "interface": "slcan", "channel": self.channel,
-                "node": CONTROLLER_NODE, "serial": str(self.serial),
-            },
+            "controller": {**self._controller_site(), "serial": str(self.serial)},
             "tracker": {
                 "kind": "emscon", "address": self.tracker.address, "serial": str(SERIAL),
                 "model": "AT901-LR", "reflector": "CCR-1.5in", "frame": self._rough_frame(),
@@ -160,7 +180,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--smrs", type=int, choices=[1, 3], default=1)
     parser.add_argument("--no-base-smrs", action="store_true", help="base nests are empty")
     parser.add_argument("--payload", type=float, default=0.0, help="kg")
-    for name in ("can", "tracker", "control"):
+    for name in ("controller", "tracker", "control"):
         parser.add_argument(f"--{name}-port", type=int, default=0)
     parser.add_argument("--site", type=Path, help="write a site file here")
     parser.add_argument("--until-stdin-closes", action="store_true", help="end with the parent")
@@ -187,7 +207,7 @@ def build(options: argparse.Namespace) -> MockStation:
     clock = ScaledClock(options.scale)
     world = World(clock, plan)
     world.payload_kg = options.payload
-    ports = (options.can_port, options.tracker_port, options.control_port)
+    ports = (options.controller_port, options.tracker_port, options.control_port)
     return MockStation(world, clock, options.nvm, ports, options.serial)
 
 
@@ -219,8 +239,9 @@ def _announce(announcement: Mapping[str, Any], as_json: bool) -> None:
     if as_json:
         print(json.dumps(announcement), flush=True)
         return
-    for name in ("machine", "can", "tracker", "control", "scale", "site_file"):
-        print(f"{name:10s} {announcement[name]}", flush=True)
+    for name, value in announcement.items():
+        if name not in ("format", "site"):
+            print(f"{name:12s} {value}", flush=True)
 
 
 def _watch_stdin(end: Callable[[], None]) -> None:

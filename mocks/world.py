@@ -11,7 +11,7 @@ import numpy as np
 
 from mocks.clock import Clock, ScaledClock
 from mocks.faults import FaultSet
-from mocks.physics.actuators import Circumstances, Load, play_widths
+from mocks.physics.actuators import Circumstances, Load, Stroke, play_widths
 from mocks.physics.bodies import body_named
 from mocks.physics.body import Surroundings
 from mocks.physics.climate import Climate
@@ -69,6 +69,16 @@ class World:
         self._payload = Steps(np.zeros(()))
         self._jump = Steps(np.zeros(6))
         self._last: Pose | None = None
+
+    @property
+    def kind(self) -> str:
+        """Name of the machine file."""
+        return self.machine.name
+
+    @property
+    def stroke(self) -> Stroke:
+        """How large a move is, in the actuators' unit."""
+        return self.body.stroke
 
     @property
     def payload_kg(self) -> float:

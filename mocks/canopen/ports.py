@@ -3,6 +3,8 @@
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
+from mocks.physics.actuators import Stroke
+
 
 class Leg(Protocol):
     """One leg's motion: extension in mm of the encoder, 0 at home."""
@@ -57,6 +59,14 @@ class Faults(Protocol):
 
 class Machine(Protocol):
     """The machine as its electronics see it."""
+
+    @property
+    def kind(self) -> str:
+        """Name of the machine file."""
+
+    @property
+    def stroke(self) -> Stroke:
+        """How large a move is, in the actuators' unit."""
 
     @property
     def clock(self) -> MachineClock:

@@ -16,20 +16,19 @@ LONGEST_PAUSE_S, SHORTEST_PAUSE_S = 0.02, 0.0005
 
 
 class CanopenStation:
-    """Seven nodes on a bus behind ``slcan`` on TCP.
+    """The nodes of one machine on a bus behind ``slcan`` on TCP.
 
     Parameters
     ----------
     world : Machine
-        The machine that they move.
+        The machine that they move; its controller's EDS is
+        ``drivers/eds/<machine>_controller.eds``.
     nvm_path : Path, optional
         File with the controller's stored parameters; None keeps them in memory.
     host, port
         Where the adapter listens; see :attr:`address`.
     serial : int
         Serial number of the controller (0x1018:4).
-    machine : str
-        Which controller: its EDS is ``drivers/eds/<machine>_controller.eds``.
     """
 
     def __init__(
@@ -39,14 +38,13 @@ class CanopenStation:
         host: str = "127.0.0.1",
         port: int = 0,
         serial: int = 1001,
-        machine: str = "hexapod",
     ) -> None:
         self._world = world
         self._bus = EndpointBus(self._silent)
         self.network = StationNetwork(self._bus)
         drive_eds = eds_path("drive402")
         self.drives = [Drive(n, drive_eds, world) for n in range(1, len(world.legs) + 1)]
-        controller_eds = eds_path(f"{machine}_controller")
+        controller_eds = eds_path(f"{world.kind}_controller")
         self.controller = Controller(CONTROLLER_NODE, controller_eds, world, self.drives, nvm_path)
         self.controller.readers[0x1018, 4] = lambda: serial
         for number, drive in enumerate(self.drives, start=1):

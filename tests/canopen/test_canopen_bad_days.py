@@ -90,7 +90,7 @@ async def test_lost_heartbeat_stops_the_machine(station, connected, slow, node: 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 async def test_reset_connection_is_a_lost_link_and_the_machine_stops(station, slow):
     await slow.move_to_pose(HIGH)
-    station.hands("reset-tcp", of="can")
+    station.hands("reset-tcp", of="controller")
     with pytest.raises(LinkLost, match="connect again"):
         await slow.wait_arrived(5.0)
     with pytest.raises(LinkLost, match="emergency stop"):

@@ -30,9 +30,11 @@ def go(w: World, extension: list[float]) -> None:
 def leg_lengths(w: World) -> Array:
     """Real leg lengths now, from the true pose."""
     from mocks.physics.hexapod import legs
+    from mocks.physics.hexapod_body import true_geometry
 
     pose = w.pose(np.array([w.clock.now()]))
-    return legs(w._geometry, pose).length[0]
+    g = true_geometry(w.parameters, w.plan.hidden)
+    return legs(g, pose).length[0]
 
 
 def extra(hidden: dict[str, float], extension: list[float]) -> Array:
