@@ -187,7 +187,7 @@ async def test_a_drive_that_fails_stops_the_machine_and_the_session_goes_on_late
     assert len(heard.of(ev.ReadingTaken)) == 14 >= taken
 
 
-@pytest.mark.parametrize("which", ["tracker", "can"])
+@pytest.mark.parametrize("which", ["tracker", "controller"])
 async def test_a_tcp_reset_ends_safely_and_resumes(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path, which: str
 ) -> None:
