@@ -55,6 +55,11 @@ def survey(machine: Machine) -> Survey:
     asked = workspace_poses(machine, task_values(machine.task, home.poses))
     found = inverse(machine, asked)
     usable = found.converged & within_limits(machine, found)
+    if not np.any(usable):
+        # A box of six coordinates may be reachable in its middle only.
+        asked = _nearer_home(machine, asked, task_values(machine.task, home.poses))
+        found = inverse(machine, asked)
+        usable = found.converged & within_limits(machine, found)
     configuration = joined(home, found.take(np.flatnonzero(usable)))
     stiffness, side = _singularity(machine, configuration)
     moves = pose_jacobians(machine, configuration).parameters
@@ -78,6 +83,16 @@ def workspace_poses(machine: Machine, home: Array) -> Array:
     ranges = [machine.workspace.get(k, (v, v)) for k, v in zip(names, home[:, 0], strict=True)]
     low, high = np.array(ranges).T
     values: Array = low[:, None] + (high - low)[:, None] * spread
+    return values
+
+
+def _nearer_home(machine: Machine, asked: Array, home: Array) -> Array:
+    """The same poses in a box a fifth as wide, about the place of the workspace nearest to home."""
+    names = machine.task.coordinates
+    ranges = [machine.workspace.get(k, (v, v)) for k, v in zip(names, home[:, 0], strict=True)]
+    low, high = np.array(ranges).T[:, :, None]
+    centre = np.clip(home, low, high)
+    values: Array = centre + 0.2 * (asked - centre)
     return values
 
 
