@@ -1,8 +1,8 @@
 """Effects of the tripod, through its elastic closure (Feng et al. 2022; notes.md section 2).
 
-Every effect moves the platform by the twists of error sources that the machine file describes in
-detail: the twist per unit of a rod's length is, by Betti's reciprocity, also the force in that rod
-per unit wrench on the platform, so gravity needs no statics of its own.
+Effects of geometry move the platform by the twists of error sources that the machine file describes
+in detail. Under its weight the platform gives way by the compliance of the closure itself: the long
+sides are equal springs, their hinges in the file's proportion to them.
 """
 
 import numpy as np
@@ -11,6 +11,7 @@ from calib.arrays import Array
 from calib.effects.component import Effect, Signature, Situation, Unknown, alone, limb_names
 from calib.effects.gravity_sag import GravitySag, weight_wrench
 from calib.effects.thermal_growth import REFERENCE_C, ThermalGrowth
+from calib.mechanism.closure import Closure, State
 from calib.mechanism.description import Machine
 from calib.runs.stack import Rows
 
@@ -26,7 +27,7 @@ def has_parallelograms(machine: Machine) -> bool:
 
 
 class TripodGravity(GravitySag):
-    """Six rods that are equal springs; the platform may tilt."""
+    """Six long sides that are equal springs; the platform may tilt."""
 
     says = "the six rods give way under the weight of platform and payload"
 
@@ -39,15 +40,33 @@ class TripodGravity(GravitySag):
         return (Unknown("gravity-sag.c", "mm/N", 1e-4),)
 
     def signature(self, situation: Situation, values: Array) -> Signature:
-        """Sum over rods of force times twist per unit of length."""
+        """Platform's compliance times the weight, for long sides of 1 mm/N."""
+        machine = situation.machine
         force, moment = weight_wrench(situation.rows, situation.rotation)
-        wrench = np.concatenate([force, moment])
-        total = np.zeros((6, situation.rows.count))
-        for limb in limb_names(situation.machine):
-            for side in SIDES:
-                twist = situation.error_twists(f"{limb}.{side}")
-                total += np.sum(wrench * twist, axis=0) * twist
-        return Signature(twist=total[None])
+        wrench = np.concatenate([force * machine.size, moment])
+        compliance = _platform_compliance(situation)[:, :, situation.state_of]
+        twist = np.einsum("ijn,jn->in", compliance, wrench) / _side_compliance(machine)
+        twist[:3] *= machine.size
+        return Signature(twist=twist[None])
+
+
+def _side_compliance(machine: Machine) -> float:
+    """Compliance of a long side in the machine file, mm/N."""
+    return max(e.compliance for limb in machine.limbs for e in limb.elements if not e.turns)
+
+
+def _platform_compliance(situation: Situation) -> Array:
+    """Inverse of A^T A (6, 6, M), A the closure's rows whitened by their flexibility.
+
+    In the engine's scaled twists (translations as parts of the machine's size).
+    """
+    closed, held = situation.closed, situation.parameters
+    state = State(closed.poses.position, closed.poses.rotation, closed.passive, list(closed.strain))
+    columns = held[:, None] if held.ndim == 1 else held
+    rows, _ = Closure(situation.closing, columns, closed.extension, state).rows()
+    stacked = np.moveaxis(rows, -1, 0)
+    inverse = np.linalg.inv(np.swapaxes(stacked, 1, 2) @ stacked)
+    return np.asarray(np.moveaxis(inverse, 0, -1))
 
 
 class TripodThermal(ThermalGrowth):

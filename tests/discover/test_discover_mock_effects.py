@@ -39,16 +39,30 @@ HIDDEN = {
     "tracker-scale": {"tracker-scale.k": 1e-4},
     "frame-shift": {"frame-shift.x": 0.05, "frame-shift.ry": 2e-4, "frame-shift.t0": 700.0},
 }
+TRIPOD = {
+    "backlash": {"backlash.limb1": 0.02},
+    "gravity-sag": {"gravity-sag.c": 3e-4},
+    "joint-azimuth": {"joint-azimuth.limb1": 1e-3, "joint-azimuth.limb3": -5e-4},
+    "parallelogram-sides": {"parallelogram-sides.limb2": 0.03},
+    "screw-pitch": {"screw-pitch.limb2": 5e-4},
+    "settling": {"settling.k": 2e-3, "settling.tau": 2.0},
+    "thermal-growth": {"thermal-growth.a": 1.2e-5},
+    "tracker-scale": {"tracker-scale.k": 1e-4},
+}
+CASES = [("hexapod", effect, hidden) for effect, hidden in sorted(HIDDEN.items())]
+CASES += [("tripod", effect, hidden) for effect, hidden in sorted(TRIPOD.items())]
 PROFILE = Profile(rise_K=8.0, payload_kg=(0.0, 12.0, 0.0, 12.0))
 
 
-@pytest.mark.parametrize("effect", sorted(HIDDEN))
-def test_discover_mock_effect_is_measured_true(effect):
-    machine = load_machine("hexapod")
-    hidden = HIDDEN[effect]
-    plan = RunPlan(seed=5, poses=50, noise_mm=0.001, hidden=Hidden(hidden), profile=PROFILE)
+@pytest.mark.parametrize(("name", "effect", "hidden"), CASES, ids=[f"{m}-{e}" for m, e, _ in CASES])
+def test_discover_mock_effect_is_measured_true(name, effect, hidden):
+    machine = load_machine(name)
+    plan = RunPlan(
+        machine=name, seed=5, poses=50, noise_mm=0.001, hidden=Hidden(hidden), profile=PROFILE
+    )
     run = simulate(plan)
-    rows = stack(machine, [parse_run(run_toml(run), points_csv(run), actuators=6)])
+    actuators = len(machine.actuators)
+    rows = stack(machine, [parse_run(run_toml(run), points_csv(run), actuators=actuators)])
     before, found = fit_effects(rows, []), fit_effects(rows, [effect_named(effect, machine)])
     assert found.bad == ()
     assert found.chi2_per_dof == pytest.approx(1.0, abs=0.12)
@@ -70,7 +84,8 @@ def test_discover_mock_tilted_joint_moves_the_readings_as_predicted(body, axis):
     """Geometry absorbs nearly all of a tilt, so displacements are compared before any refit."""
     machine = load_machine("hexapod")
     name = f"joint-tilt.leg2.{body}.{axis}"
-    plan = RunPlan(seed=5, poses=30, parameters=nominal_parameters(machine_file("hexapod")))
+    nominal = nominal_parameters(machine_file("hexapod"))
+    plan = RunPlan(machine="hexapod", seed=5, poses=30, parameters=nominal)
     plain, tilted = simulate(plan), simulate(replace(plan, hidden=Hidden({name: 2e-3})))
     rows = stack(machine, [parse_run(run_toml(plain), points_csv(plain), actuators=6)])
     fitted = fit_effects(rows, [])
