@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from app.session.frame import Array, Frame, fit_frame
 from app.session.journal import Journal, Row
 from app.session.plan import Plan
 from app.site import Site
+from calib.arrays import Array
 from calib.errors import BadInput
+from calib.frames import Frame, fit_frame
 
 FORMAT = "pkm-verification/1"
 _TRIALS = 300

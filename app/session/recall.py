@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from app.session.frame import fit_frame
 from app.session.work import Work
+from calib.frames import fit_frame
 
 
 def recall(work: Work) -> None:

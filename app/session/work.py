@@ -15,12 +15,13 @@ from app.session.events import (
     Released,
     Suspended,
 )
-from app.session.frame import Array, Frame, nest_in_base
 from app.session.hands import nobody_to_ask
 from app.session.journal import Journal, NewRow
 from app.session.plan import Plan, Pose
 from app.session.station import Station
 from app.site import Limits, Site
+from calib.arrays import Array
+from calib.frames import Frame, nest_in_base
 from drivers.errors import DeviceError
 from drivers.interface import Alarm, MotionController, Tracker
 

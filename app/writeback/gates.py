@@ -12,9 +12,9 @@ import numpy as np
 from app.errors import GateRefused
 from app.fit_file import SavedFit
 from app.session.events import GateChecked
-from app.session.frame import Array
 from app.verification import Summary
 from app.writeback.proposal import Proposal
+from calib.arrays import Array
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians

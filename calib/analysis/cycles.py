@@ -7,7 +7,8 @@ import numpy as np
 
 from calib.arrays import Array
 from calib.errors import BadInput
-from calib.identify.alignment import align, collinear
+from calib.frames import align
+from calib.identify.alignment import collinear
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import Poses, to_euler
 from calib.mechanism.solve import forward

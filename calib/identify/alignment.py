@@ -1,24 +1,15 @@
 """First guess of the base frame in the tracker frame: rigid alignment of the nests.
 
-The closed form is Kabsch's (Acta Cryst. A32, 1976): with centred points, R = V diag(1, 1, d) U^T
-from the singular value decomposition of sum b p^T. Readings that do not fit the majority are left
-out: they are tried against random triples of readings.
+Readings that do not fit the majority are left out: they are tried against random triples of
+readings.
 """
 
 import numpy as np
 
 from calib.arrays import Array, BoolArray
+from calib.frames import align
 
 TRIPLES = 400
-
-
-def align(base: Array, tracker: Array) -> tuple[Array, Array]:
-    """Rotation (3, 3) and translation (3,) that take points (3, N) of base to tracker best."""
-    centre_b, centre_t = base.mean(axis=1), tracker.mean(axis=1)
-    u, _, vt = np.linalg.svd((base - centre_b[:, None]) @ (tracker - centre_t[:, None]).T)
-    handed = np.sign(np.linalg.det(vt.T @ u.T))
-    rotation = vt.T @ np.diag([1.0, 1.0, handed]) @ u.T
-    return rotation, centre_t - rotation @ centre_b
 
 
 def misfit(base: Array, tracker: Array, rotation: Array, position: Array) -> Array:

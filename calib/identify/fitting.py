@@ -18,7 +18,8 @@ from scipy import linalg
 
 from calib.arrays import Array, BoolArray
 from calib.errors import BadInput
-from calib.identify.alignment import align, collinear, robust_align
+from calib.frames import align
+from calib.identify.alignment import collinear, robust_align
 from calib.identify.readings import BadReading, strays, wrong_place
 from calib.mechanism.rigid import euler_rates, rotate, to_euler
 from calib.mechanism.solve import forward

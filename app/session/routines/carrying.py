@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from app.session.frame import Array
 from app.session.journal import NewRow
 from app.session.plan import Step
 from app.session.routines.beam import measured
 from app.session.routines.moving import ensure_at
 from app.session.work import HOME, Done, Work
+from calib.arrays import Array
 from drivers.errors import BeamBroken, NoTarget
 
 _LOOK_S = 0.5

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from app.session.events import DriftChecked, FrameFound, ReadingTaken
-from app.session.frame import Array, exchanged, fit_frame
 from app.session.plan import Step
 from app.session.routines.beam import measured
 from app.session.routines.carrying import ensure_smr, rejected_row
@@ -13,6 +12,8 @@ from app.session.routines.moving import ensure_at
 from app.session.routines.preparing import channels
 from app.session.routines.reading import reading_row
 from app.session.work import HOME, Done, Work
+from calib.arrays import Array
+from calib.frames import exchanged, fit_frame
 from drivers.errors import NotReady
 
 

@@ -1,4 +1,4 @@
-"""Where the base stands in the tracker's frame: a rigid fit, and predictions with it.
+"""One frame in another: rigid motions, and their fit to points.
 
 Points are (3,) or (3, N) arrays in mm. A frame as six numbers: x, y, z, rx, ry, rz with
 p_tracker = R p_base + t and R = Rz(rz) Ry(ry) Rx(rx).
@@ -9,11 +9,9 @@ from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from calib.arrays import Array
 from calib.mechanism.rigid import Poses, to_euler
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,16 +46,24 @@ class Frame:
         return Frame(back, -back @ self.translation)
 
 
-def fit_frame(points: Array, seen: Array) -> tuple[Frame, float]:
-    """Fit seen = R points + t by least squares (Kabsch); both (3, N), N >= 3.
+def align(points: Array, seen: Array) -> tuple[Array, Array]:
+    """Rotation (3, 3) and translation (3,) that take points (3, N) to ``seen`` (3, N) best.
 
-    Returns the frame and the RMS distance that is left, mm.
+    The closed form is Kabsch's (Acta Cryst. A32, 1976): with centred points,
+    R = U diag(1, 1, d) V^T from the singular value decomposition of sum seen points^T.
     """
     centre, seen_centre = points.mean(axis=1), seen.mean(axis=1)
     u, _, vt = np.linalg.svd((seen - seen_centre[:, None]) @ (points - centre[:, None]).T)
-    handed = np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
-    rotation = u @ handed @ vt
-    frame = Frame(rotation, seen_centre - rotation @ centre)
+    rotation = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
+    return rotation, seen_centre - rotation @ centre
+
+
+def fit_frame(points: Array, seen: Array) -> tuple[Frame, float]:
+    """Fit seen = R points + t by least squares; both (3, N), N >= 3.
+
+    Returns the frame and the RMS distance that is left, mm.
+    """
+    frame = Frame(*align(points, seen))
     left = seen - frame.apply(points)
     return frame, float(np.sqrt(np.mean(np.sum(left * left, axis=0))))
 

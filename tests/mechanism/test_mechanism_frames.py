@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.session.frame import Frame, exchanged, fit_frame, nest_in_base
+from calib.frames import Frame, exchanged, fit_frame, nest_in_base
 
 POINTS = np.array([[260.0, 0, -30], [0, 260.0, -30], [-260.0, 0, -30], [0, -250.0, -10]]).T
 
