@@ -41,7 +41,7 @@ HIDDEN = {
 }
 TRIPOD = {
     "backlash": {"backlash.limb1": 0.02},
-    "gravity-sag": {"gravity-sag.c": 3e-4},
+    "gravity-sag": {"gravity-sag.c": 1e-4},
     "joint-azimuth": {"joint-azimuth.limb1": 1e-3, "joint-azimuth.limb3": -5e-4},
     "parallelogram-sides": {"parallelogram-sides.limb2": 0.03},
     "screw-pitch": {"screw-pitch.limb2": 5e-4},
