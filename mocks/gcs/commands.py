@@ -12,6 +12,8 @@ from mocks.gcs.numbers import flag, real, whole
 from mocks.gcs.parameter_commands import ParameterCommands
 
 FIRMWARE = "1.0.0"
+# Not plain TRIPOD: PI's client takes a controller of that name for one of GCS 1.
+PRODUCT = "PKM-TRIPOD"
 STATUS_REGISTER = 1
 
 
@@ -22,7 +24,7 @@ class CommandSet:
         self._controller = controller
         about_parameters = ParameterCommands(controller)
         self._queries: dict[str, Callable[[list[str]], list[str]]] = {
-            "*IDN?": lambda words: [f"pkmcal mock, tripod, {controller.serial}, {FIRMWARE}"],
+            "*IDN?": lambda words: [f"pkmcal mock, {PRODUCT}, {controller.serial}, {FIRMWARE}"],
             "CSV?": lambda words: ["2.0"],
             "ERR?": self._error,
             "SAI?": self._axes,
