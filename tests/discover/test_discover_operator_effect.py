@@ -230,3 +230,14 @@ def test_formula_without_value_names_the_reading(situation):
 def test_actuator_that_does_not_exist_is_said(situation):
     effect = described('"k * s7"', '{ k = "1" }')
     assert "there are 6 actuators" in effect.unavailable(situation.rows)
+
+
+def test_example_of_the_docs_works(situation):
+    page = Path(__file__).parents[2] / "docs" / "own-effects.md"
+    text = page.read_text(encoding="utf-8").split("```toml\n")[1].split("```")[0]
+    effect = effect_from_text(text, "docs")
+    assert [unknown.name for unknown in effect.unknowns(situation.rows)] == [
+        "warming.k",
+        "warming.tau",
+    ]
+    check_derivatives(effect, situation, np.random.default_rng(4))
