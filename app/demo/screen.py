@@ -10,7 +10,8 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 
 from app.demo.job import STEPS, Outcome, Watcher
-from app.verification import PAPER, Summary
+from app.verification import PAPER
+from calib.pose_error import Summary
 
 
 class DemoScreen:

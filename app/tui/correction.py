@@ -13,12 +13,12 @@ from app.session import events as ev
 from app.session.known import Snapshot, compare_with_known
 from app.session.session import Session
 from app.session.station import Station
-from app.verification import Summary
 from app.writeback.gates import Gates, gates_of_proposal
 from app.writeback.procedure import WriteBack, accept, undo
 from app.writeback.proposal import Proposal, propose
 from app.writeback.transfer import snapshots_of
 from calib.errors import BadInput
+from calib.pose_error import Summary
 from drivers.errors import DeviceError
 
 if TYPE_CHECKING:

@@ -17,7 +17,8 @@ from app.tui.picture import Picture
 from app.tui.shelf import finished_verifications
 from app.tui.verifying import Verified
 from app.tui.widgets.plots import PairPlot
-from app.verification import PAPER, Summary
+from app.verification import PAPER
+from calib.pose_error import Summary
 
 ALL, QUICK = "all 216 poses", "quick: 27 poses"
 

@@ -11,11 +11,11 @@ from app.console import ConsoleFace, in_daemon_thread, stopping, unattended
 from app.fit_file import SavedFit, read_fit
 from app.session.station import Station
 from app.site import Site, load_site
-from app.verification import Summary
 from app.writeback.gates import LIMITS, Gates
 from app.writeback.procedure import Applied, WriteBack
 from app.writeback.proposal import Proposal
 from calib.errors import BadInput
+from calib.pose_error import Summary
 
 
 @click.command(

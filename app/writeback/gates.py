@@ -12,7 +12,6 @@ import numpy as np
 from app.errors import GateRefused
 from app.fit_file import SavedFit
 from app.session.events import GateChecked
-from app.verification import Summary
 from app.writeback.proposal import Proposal
 from calib.arrays import Array
 from calib.errors import BadInput
@@ -21,6 +20,7 @@ from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.limits import violations
 from calib.mechanism.rigid import pose_difference
 from calib.mechanism.solve import Configuration, forward, inverse
+from calib.pose_error import Summary
 from calib.poses import verification_poses
 
 LIMITS: dict[str, float] = {

@@ -17,10 +17,11 @@ from app.session.plan import Pose
 from app.session.plans import PlanOptions, measure_plan, order_for
 from app.session.session import Session
 from app.session.station import Station
-from app.verification import Summary, Verification, judge
+from app.verification import Verification, judge
 from app.writeback.gates import Gates, gates_of_check, gates_of_proposal, refuse_if_any
 from app.writeback.proposal import Proposal, propose
 from app.writeback.transfer import keep, prove, snapshots_of, write_volatile
+from calib.pose_error import Summary
 from calib.poses import verification_poses
 from drivers.errors import DeviceError, ParameterError, Refused
 
