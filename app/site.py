@@ -12,6 +12,13 @@
     node = 10                         # the controller's node; the drives are 1, 2, ...
     serial = "..."                    # optional; refused at connect if another one answers
 
+    [controller]                      # or one that speaks GCS 2.0
+    kind = "gcs"
+    port = "COM3"                     # "/dev/ttyUSB0", "socket://192.168.0.5:50000"
+    baudrate = 115200
+    axes = "A B C"                    # what it calls the actuators, in their order
+    pose_axes = "X Y Z"               # and the coordinates of the platform
+
     [tracker]
     kind = "emscon"
     address = "192.168.0.1:700"
@@ -157,7 +164,7 @@ def parse_site(text: str, source: str, folder: Path) -> Site:
         title=top.text("title", ""),
         machine_name=machine_name,
         machine=machine,
-        controller=_controller(top.table("controller")),
+        controller=_controller(top.table("controller"), len(machine.actuators)),
         tracker=_tracker(top.table("tracker")),
         platform_nests={name: platform.vector(name, 3) for name in platform.keys()},  # noqa: SIM118
         base_nests={name: base.vector(name, 3) for name in base.keys()},  # noqa: SIM118
@@ -185,17 +192,37 @@ def _check_nests(site: Site, base: TableReader) -> None:
         raise base.wrong(name, f'nest "{name}" is on both', "Give every nest its own name")
 
 
-def _controller(table: TableReader) -> ControllerSite:
-    kind = table.choice("kind", ["canopen"])
+def _controller(table: TableReader, actuators: int) -> ControllerSite:
+    kind = table.choice("kind", ["canopen", "gcs"])
     serial = table.text("serial", "")
-    settings: dict[str, Any] = {
+    settings = _gcs(table, actuators) if kind == "gcs" else _canopen(table)
+    table.end()
+    return ControllerSite(kind, serial, settings)
+
+
+def _canopen(table: TableReader) -> dict[str, Any]:
+    return {
         "interface": table.text("interface", "slcan"),
         "channel": table.text("channel"),
         "bitrate": table.whole("bitrate", 0),
         "controller_node": table.whole("node", 10, least=1),
     }
-    table.end()
-    return ControllerSite(kind, serial, settings)
+
+
+def _gcs(table: TableReader, actuators: int) -> dict[str, Any]:
+    axes = table.text("axes", "A B C").split()
+    if len(axes) != actuators:
+        raise table.wrong(
+            "axes", f"{len(axes)} axes, {actuators} actuators", "Name one axis an actuator"
+        )
+    return {
+        "channel": table.text("port"),
+        "baudrate": table.whole("baudrate", 115200, least=300),
+        "axes": axes,
+        "pose_axes": table.text("pose_axes", "X Y Z").split(),
+        "level_password": table.text("level_password", "advanced"),
+        "store_password": table.text("store_password", "100"),
+    }
 
 
 def _tracker(table: TableReader) -> TrackerSite:

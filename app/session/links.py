@@ -3,11 +3,14 @@
 from app.site import Site
 from drivers.canopen.controller import CanopenController
 from drivers.emscon.tracker import EmsconTracker
+from drivers.gcs.controller import Axes, GcsController
 from drivers.interface import MotionController, Tracker
 
 
 async def open_controller(site: Site) -> MotionController:
     """Connect to the site's motion controller; raises a DeviceError if it does not answer."""
+    if site.controller.kind == "gcs":
+        return await _open_gcs(site)
     settings = site.controller.settings
     return await CanopenController.connect(
         settings["interface"],
@@ -17,6 +20,20 @@ async def open_controller(site: Site) -> MotionController:
         node_id=settings["controller_node"],
         serial=site.controller.serial or None,
         limits={a.name: a.limits for a in site.machine.actuators},
+    )
+
+
+async def _open_gcs(site: Site) -> MotionController:
+    settings = site.controller.settings
+    names = [actuator.name for actuator in site.machine.actuators]
+    return await GcsController.connect(
+        settings["channel"],
+        settings["baudrate"],
+        axes=Axes(dict(zip(names, settings["axes"], strict=True)), settings["pose_axes"]),
+        serial=site.controller.serial or None,
+        limits={a.name: a.limits for a in site.machine.actuators},
+        level=f"CCL 1 {settings['level_password']}",
+        store_password=settings["store_password"],
     )
 
 
