@@ -7,19 +7,24 @@ beside it. The judge's view exists on a mock only: the noise-free truth.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from app.machine_files import read_text
 from app.session.journal import Journal, Row
-from app.session.plan import Plan
-from app.site import Site
+from app.session.plan import Plan, Pose
+from app.session.plans import PlanOptions, measure_plan, order_for
+from app.site import Site, load_site
 from calib.arrays import Array
 from calib.errors import BadInput
 from calib.frames import Frame, fit_frame
 from calib.pose_error import SeenPoints, Summary, noise_peaks, pose_errors, summary
 
 FORMAT = "pkm-verification/1"
+REFERENCE_EVERY = 40
+"""Poses between two looks at the base nests."""
 PAPER = {"position_peak_um": 12.0, "orientation_peak_deg": 0.0051}
 """Han et al. 2020, Table 6, measured after calibration."""
 
@@ -74,6 +79,31 @@ class Verification:
                 for k, label in enumerate(self.labels)
             ],
         }
+
+
+def verification_plan(
+    site: Site, poses: Mapping[str, Pose], *, truth: bool, reference_every: int = REFERENCE_EVERY
+) -> Plan:
+    """Visit poses to see how far off the machine is; ``truth`` also asks a mock."""
+    options = PlanOptions(
+        order=order_for(site),
+        reference_every=reference_every,
+        warm_up=False,
+        two_face=False,
+        truth=truth,
+        title=f"verification, {len(poses)} poses",
+    )
+    return measure_plan(site, poses, options, "verify")
+
+
+def judge_session(folder: Path) -> Verification:
+    """Judge a finished session from its folder; raises as :func:`judge` does."""
+    plan = Plan.from_json(read_text(folder / "plan.json"), str(folder / "plan.json"))
+    journal = Journal(folder / "journal.sqlite", read_only=True)
+    try:
+        return judge(load_site(folder / "site.toml"), plan, journal)
+    finally:
+        journal.close()
 
 
 def judge(site: Site, plan: Plan, journal: Journal) -> Verification:

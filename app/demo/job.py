@@ -15,12 +15,11 @@ from app.pose_files import full_poses, nest_matrix, render_design
 from app.report.build import write_report
 from app.session import PlanOptions, Session, measure_plan
 from app.session import events as ev
-from app.session.journal import Journal
 from app.session.plan import Pose
 from app.session.plans import order_for
 from app.session.station import Station
 from app.site import Site, load_site
-from app.verification import Verification, judge
+from app.verification import Verification, judge_session, verification_plan
 from app.writeback.gates import Gates
 from app.writeback.procedure import WriteBack
 from calib.identify import fit
@@ -116,22 +115,10 @@ class Demo:
     async def _verify(self, site: Site, step: str) -> Verification:
         self.watcher.begins(step)
         poses = verification_poses(site.machine).by_label
-        options = PlanOptions(
-            order=order_for(site),
-            reference_every=40,
-            warm_up=False,
-            two_face=False,
-            truth=True,
-            title=f"verification {step}, {len(poses)} poses",
-        )
-        plan = measure_plan(site, poses, options, "verify")
+        plan = verification_plan(site, poses, truth=True)
         session = Session.create(site, plan, self.folder / "sessions", unattended=True)
         await self._session(step, session)
-        journal = Journal(session.folder / "journal.sqlite", read_only=True)
-        try:
-            found = judge(site, plan, journal)
-        finally:
-            journal.close()
+        found = judge_session(session.folder)
         saved = {**found.to_json(), "session": str(session.folder)}
         (self.folder / f"{step}.json").write_text(json.dumps(saved, indent=1), encoding="utf-8")
         seen = found.measured

@@ -6,12 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from app.machine_files import read_text
-from app.session import Plan, PlanOptions, measure_plan
-from app.session.journal import Journal
-from app.session.plans import order_for
-from app.site import Site, load_site
-from app.verification import Verification, judge
+from app.session import Plan
+from app.site import Site
+from app.verification import Verification, judge_session
+from app.verification import verification_plan as plan_for
 from calib.arrays import Array
 from calib.poses import verification_poses
 
@@ -39,26 +37,12 @@ async def verification_plan(site: Site, quick: bool) -> Plan:
             for node in range(len(labels) // QUICK_EVERY)
         ]
         poses = {label: poses[label] for label in chosen}
-    options = PlanOptions(
-        order=order_for(site),
-        reference_every=40,
-        warm_up=False,
-        two_face=False,
-        truth=site.hands.kind == "mock",
-        title=f"verification, {len(poses)} poses",
-    )
-    return measure_plan(site, poses, options, "verify")
+    return plan_for(site, poses, truth=site.hands.kind == "mock")
 
 
 def verified(folder: Path) -> Verified:
     """Judge a finished session from its folder; raises :class:`calib.errors.BadInput`."""
-    plan = Plan.from_json(read_text(folder / "plan.json"), str(folder / "plan.json"))
-    site = load_site(folder / "site.toml")
-    journal = Journal(folder / "journal.sqlite", read_only=True)
-    try:
-        found = judge(site, plan, journal)
-    finally:
-        journal.close()
+    found = judge_session(folder)
     position = 1e3 * np.linalg.norm(found.position_mm, axis=0)
     angle = 1e3 * np.rad2deg(np.linalg.norm(found.rotation_rad, axis=0))
     return Verified(folder, found, np.array([position, angle]))

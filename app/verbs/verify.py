@@ -11,11 +11,9 @@ from app import answer
 from app.console import run_on_console, unattended
 from app.machine_files import read_text
 from app.pose_files import read_any_poses
-from app.session import PlanOptions, Session, measure_plan
-from app.session.journal import Journal
-from app.session.plans import order_for
+from app.session import Session
 from app.site import load_site
-from app.verification import FORMAT, judge
+from app.verification import FORMAT, REFERENCE_EVERY, judge_session, verification_plan
 from calib.errors import BadInput
 from calib.poses import verification_poses
 
@@ -32,7 +30,7 @@ from calib.poses import verification_poses
 )
 @click.option(
     "--reference-every",
-    default=40,
+    default=REFERENCE_EVERY,
     show_default=True,
     type=click.IntRange(1),
     help="Poses between two looks at the base nests.",
@@ -79,23 +77,11 @@ def command(
         if poses_file
         else verification_poses(site.machine).by_label
     )
-    options = PlanOptions(
-        order=order_for(site),
-        reference_every=reference_every,
-        warm_up=False,
-        two_face=False,
-        truth=truth,
-        title=f"verification, {len(poses)} poses",
-    )
-    plan = measure_plan(site, poses, options, "verify")
+    plan = verification_plan(site, poses, truth=truth, reference_every=reference_every)
     session = Session.create(site, plan, folder, unattended=unattended(alone))
     answer.say(f"session {session.folder}")
     asyncio.run(run_on_console(session, quiet=as_json))
-    journal = Journal(session.folder / "journal.sqlite", read_only=True)
-    try:
-        found = judge(site, plan, journal).to_json()
-    finally:
-        journal.close()
+    found = judge_session(session.folder).to_json()
     found["session"] = str(session.folder)
     found["before"] = before and {k: before[k] for k in ("measured", "truth", "noise_alone")}
     if save_file:
