@@ -3,10 +3,13 @@
 import json
 import math
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 import click
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -46,6 +49,18 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
         cells += [cell.rjust(width) for cell, width in zip(line[1:], widths[1:], strict=True)]
         text.append("  ".join(cells).rstrip())
     return "\n".join(text)
+
+
+@contextmanager
+def working(text: str) -> Iterator[None]:
+    """Show that something takes its time, and for how long, while a person looks on."""
+    console = Console(stderr=True)
+    columns = (SpinnerColumn(), TextColumn(text, markup=False), BarColumn(24), TimeElapsedColumn())
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as progress:
+        progress.add_task("", total=None)
+        yield
 
 
 def interactive() -> bool:

@@ -24,7 +24,8 @@ def command(runs: tuple[str, ...], add: tuple[str, ...], model: Path | None, as_
     would bring; or that nothing is missing; or that something unknown is.
     """
     refit, begin = load_refitter(runs, add, model)
-    report = diagnosis_report(refit(begin).run)
+    with answer.working("testing every known effect"):
+        report = diagnosis_report(refit(begin).run)
     answer.show(report, as_json, words(report))
 
 

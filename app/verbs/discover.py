@@ -35,7 +35,8 @@ def command(
     An effect is accepted only if poses that the fit has not seen are predicted no worse with it.
     """
     refit, begin = load_refitter(runs, add, model)
-    found = discover_run(refit, begin)
+    with answer.working("looking for effects, adding the best, fitting again"):
+        found = discover_run(refit, begin)
     report = discovery_report(found)
     if save is not None:
         write_model(save, stage_of(found).run.fit)

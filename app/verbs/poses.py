@@ -83,17 +83,17 @@ def command(
         _write_verification(machine, out, as_json)
         return
     readings = _readings(machine, site_file, sigma_um, angle_mdeg)
-    answer.say(f"choosing {count} of {candidates} reachable poses ...")
-    design = design_poses(
-        machine,
-        readings,
-        count,
-        np.random.default_rng(seed),
-        criterion="D" if criterion == "D" else "I",
-        priors=priors,
-        candidates=candidates,
-        counts=[n for n in TABLE if n <= candidates],
-    )
+    with answer.working(f"choosing {count} of {candidates} reachable poses"):
+        design = design_poses(
+            machine,
+            readings,
+            count,
+            np.random.default_rng(seed),
+            criterion="D" if criterion == "D" else "I",
+            priors=priors,
+            candidates=candidates,
+            counts=[n for n in TABLE if n <= candidates],
+        )
     if out:
         # What brings the same poses again stands in the file.
         comment = (
