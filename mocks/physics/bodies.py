@@ -4,11 +4,13 @@ from functools import cache
 
 from mocks.physics.body import Body
 from mocks.physics.hexapod_body import HexapodBody
+from mocks.physics.ptm_body import PtmBody
 from mocks.physics.tripod_body import TripodBody
 
-BODIES: dict[str, type[HexapodBody] | type[TripodBody]] = {
+BODIES: dict[str, type[HexapodBody] | type[TripodBody] | type[PtmBody]] = {
     "hexapod": HexapodBody,
     "tripod": TripodBody,
+    "ptm": PtmBody,
 }
 
 
