@@ -22,6 +22,8 @@ from drivers.interface import ActuatorState, Alarm, ControllerState, Identity
 # Bits of status register 1.
 ERROR, SERVO, MOVING, REFERENCING, ON_TARGET = 1 << 8, 1 << 12, 1 << 13, 1 << 14, 1 << 15
 SINGLE_MOTION_S, REST_S, FAREWELL_S, POLL_S = 60.0, 2.0, 1.5, 0.005
+# What a solver may leave of an angle that is meant to be 0.
+LEVEL_RAD = 1e-6
 REMEDY_SERVO = "Remove the cause, clear the faults and enable the machine again."
 
 
@@ -305,7 +307,7 @@ class GcsController:
         count = len(self.axes.pose)
         position, turn = pose[:count], pose[count:]
         self._check_numbers(position, count, "pose")
-        if any(turn):
+        if any(abs(angle) > LEVEL_RAD for angle in turn):
             raise Refused(
                 f"the platform cannot turn, the pose asks for {turn}",
                 device=self._device,
