@@ -25,7 +25,9 @@ from bench.blind_page import page
 from calib.discover.pairs import power
 from calib.discover.run_discovery import Refitter, RunStage, discover_run, stage_of
 from calib.effects import catalogue
-from calib.runs import parse_run
+from calib.poses.design import design_poses
+from calib.poses.readings import NestReadings
+from calib.runs import parse_header, parse_run
 from calib.runs.stack import Rows, stack
 from mocks.simulate.files import points_csv, run_toml
 
@@ -54,32 +56,33 @@ class Outcome:
 
 
 @lru_cache(maxsize=8)
-def designed(number: int) -> np.ndarray:
-    """29 poses chosen for predicted pose error, (29, 6)."""
-    from calib.poses.design import design_poses
-    from calib.poses.readings import NestReadings
-
-    nests = np.array([[0.0, 100.0, 0.0], [-86.60254, -50.0, 0.0], [86.60254, -50.0, 0.0]]).T
-    base = np.array([[260.0, 0, -30], [0, 260.0, -30], [-260.0, 0, -30], [0, -260.0, -30]]).T
-    readings = NestReadings(nests, SIGMA_MM, base)
-    machine = load_machine("hexapod")
+def designed(machine: str, number: int) -> np.ndarray:
+    """29 poses chosen for predicted pose error, (29, k) in the machine's task coordinates."""
+    empty, _ = build(Case(0, (), (), "", machine=machine), 4)
+    header = parse_header(run_toml(empty))
+    readings = NestReadings(
+        np.array(list(header.platform_nests.values())).T,
+        SIGMA_MM,
+        np.array(list(header.base_nests.values())).T,
+    )
     generator = np.random.default_rng(number)
-    chosen = design_poses(machine, readings, 29, generator, counts=())
-    return np.asarray(chosen.pose_set.poses.to_xyz_rpy().T)
+    chosen = design_poses(load_machine(machine), readings, 29, generator, counts=())
+    return np.asarray(chosen.pose_set.task.T)
 
 
 def poses_of(case: Case) -> object:
     """Poses of a case: a designed set, or a number of random ones."""
     kind, number = case.poses.split()
-    return designed(case.seed % 3) if kind == "designed" else int(number)
+    return designed(case.machine, case.seed % 3) if kind == "designed" else int(number)
 
 
 def solve(case: Case) -> Outcome:
     """Simulate, discover, compare."""
     poses = poses_of(case)
     simulated, hidden = build(case, poses)
-    run = parse_run(run_toml(simulated), points_csv(simulated), actuators=6)
-    machine = load_machine("hexapod")
+    machine = load_machine(case.machine)
+    actuators = len(machine.actuators)
+    run = parse_run(run_toml(simulated), points_csv(simulated), actuators=actuators)
     rows = stack(machine, [run])
     begin = time.perf_counter()
     refit = Refitter(rows, catalogue(machine))
@@ -165,22 +168,25 @@ def main() -> None:
     parser.add_argument("--null", type=int, default=400)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--machines", default="hexapod,tripod")
     parser.add_argument("--only", choices=("single", "several", "unknown"))
     parser.add_argument("--page", type=Path)
     options = parser.parse_args()
-    begin = time.perf_counter()
-    cases = [
-        case
-        for case in draw_cases(options.cases, options.seed, POSE_SETS)
-        if options.only is None or options.only == case.kind
-    ]
-    nulls = [
-        Case(500_000 + 1000 * options.seed + k, (), (), POSE_SETS[k % len(POSE_SETS)])
-        for k in range(options.null)
-    ]
-    outcomes = run_all([*cases, *nulls], options.workers)
     command = f"python -m bench.blind --cases {options.cases} --null {options.null}"
-    text = page(outcomes, f"{command} --seed {options.seed}", time.perf_counter() - begin)
+    text = f"# Blind trial\n\nWritten by `{command} --seed {options.seed}`.\n"
+    for machine in options.machines.split(","):
+        begin = time.perf_counter()
+        cases = [
+            case
+            for case in draw_cases(options.cases, options.seed, POSE_SETS, machine)
+            if options.only is None or options.only == case.kind
+        ]
+        nulls = [
+            Case(500_000 + 1000 * options.seed + k, (), (), POSE_SETS[k % 4], machine=machine)
+            for k in range(options.null)
+        ]
+        outcomes = run_all([*cases, *nulls], options.workers)
+        text += "\n" + page(outcomes, machine, time.perf_counter() - begin)
     print(text)
     if options.page is not None:
         options.page.write_text(text, encoding="utf-8")

@@ -10,11 +10,15 @@ from mocks.simulate.plan import Profile, RunPlan
 from mocks.simulate.run import SimulatedRun, simulate
 
 SIGMA_MM = 0.005
-LEGS = tuple(f"leg{k}" for k in range(1, 7))
+LEGS = {
+    "hexapod": tuple(f"leg{k}" for k in range(1, 7)),
+    "tripod": tuple(f"limb{k}" for k in range(1, 4)),
+}
+NESTS = {"hexapod": ("3", "4", "5"), "tripod": ("p1", "p2", "p3")}
 PROFILE = Profile(rise_K=6.0, payload_kg=(0.0, 12.0, 0.0, 12.0, 0.0, 12.0))
 
 Table = dict[str, float]
-Draw = Callable[[np.random.Generator], Table]
+Draw = Callable[[str, np.random.Generator], Table]
 
 
 @dataclass(frozen=True)
@@ -26,6 +30,7 @@ class Case:
     sizes: tuple[float, ...]
     poses: str
     unknown: bool = False
+    machine: str = "hexapod"
 
     @property
     def kind(self) -> str:
@@ -35,19 +40,24 @@ class Case:
         return ("none", "single", "several")[min(len(self.effects), 2)]
 
 
-def _legs(stem: str, rng: np.random.Generator) -> Table:
+def _legs(stem: str, machine: str, rng: np.random.Generator) -> Table:
     """One leg, or all of them, with equal probability."""
-    chosen = LEGS if rng.random() < 0.5 else (LEGS[rng.integers(6)],)
+    legs = LEGS[machine]
+    chosen = legs if rng.random() < 0.5 else (legs[rng.integers(len(legs))],)
     return {f"{stem}.{leg}": float(rng.standard_normal()) for leg in chosen}
 
 
-def _backlash(rng: np.random.Generator) -> Table:
-    return {name: abs(value) for name, value in _legs("backlash", rng).items()}
+def _of_legs(stem: str) -> Draw:
+    return lambda machine, rng: _legs(stem, machine, rng)
 
 
-def _cyclic(rng: np.random.Generator) -> Table:
+def _backlash(machine: str, rng: np.random.Generator) -> Table:
+    return {name: abs(value) for name, value in _legs("backlash", machine, rng).items()}
+
+
+def _cyclic(machine: str, rng: np.random.Generator) -> Table:
     table = {"screw-cyclic.period": float(np.exp(rng.uniform(np.log(1.5), np.log(12.0))))}
-    for name, value in _legs("screw-cyclic", rng).items():
+    for name, value in _legs("screw-cyclic", machine, rng).items():
         phase = rng.uniform(0.0, 2.0 * np.pi)
         table[f"{name}.sin"] = float(value * np.cos(phase))
         table[f"{name}.cos"] = float(value * np.sin(phase))
@@ -58,70 +68,87 @@ def _direction(names: Sequence[str], rng: np.random.Generator) -> Table:
     return dict(zip(names, map(float, rng.standard_normal(len(names))), strict=True))
 
 
-def _drift(rng: np.random.Generator) -> Table:
+def _drift(machine: str, rng: np.random.Generator) -> Table:
     table = _direction([f"tracker-drift.v{axis}" for axis in "xyz"], rng)
     table.update({f"tracker-drift.w{axis}": float(7e-4 * rng.standard_normal()) for axis in "xyz"})
     return table
 
 
-def _nest(rng: np.random.Generator) -> Table:
-    nest = ("3", "4", "5")[rng.integers(3)]
+def _nest(machine: str, rng: np.random.Generator) -> Table:
+    nest = NESTS[machine][rng.integers(3)]
     return _direction([f"nest-offset.{nest}.{axis}" for axis in "xyz"], rng)
 
 
-def _tilt(rng: np.random.Generator) -> Table:
+def _tilt(machine: str, rng: np.random.Generator) -> Table:
+    legs = LEGS[machine]
     names = [
-        f"joint-tilt.{leg}.{body}.{axis}"
-        for leg in LEGS
-        for body in ("base", "platform")
-        for axis in "yz"
+        f"joint-tilt.{leg}.{b}.{a}" for leg in legs for b in ("base", "platform") for a in "yz"
     ]
     return _direction(names, rng)
 
 
-def _shift(rng: np.random.Generator) -> Table:
+def _shift(machine: str, rng: np.random.Generator) -> Table:
     table = _direction([f"frame-shift.{axis}" for axis in "xyz"], rng)
     table["frame-shift.where"] = float(rng.integers(2))
     table["frame-shift.t0"] = float(rng.uniform(0.2, 0.8))
     return table
 
 
-def _settling(rng: np.random.Generator) -> Table:
+def _settling(machine: str, rng: np.random.Generator) -> Table:
     return {"settling.k": float(rng.choice([-1.0, 1.0])), "settling.tau": float(rng.uniform(1, 4))}
 
 
 def _one(name: str) -> Draw:
-    return lambda rng: {name: float(rng.choice([-1.0, 1.0]))}
+    return lambda machine, rng: {name: float(rng.choice([-1.0, 1.0]))}
+
+
+def _positive(name: str) -> Draw:
+    return lambda machine, rng: {name: 1.0}
+
+
+def _tide(machine: str, rng: np.random.Generator) -> Table:
+    period = float(rng.uniform(400, 1500))
+    return {"unknown.tide.amplitude": 1.0, "unknown.tide.period": period}
+
+
+def _wobble(machine: str, rng: np.random.Generator) -> Table:
+    return {"unknown.wobble.amplitude": 1.0, "unknown.wobble.period": float(rng.uniform(5, 20))}
 
 
 EFFECTS: dict[str, Draw] = {
     "backlash": _backlash,
     "frame-shift": _shift,
-    "gravity-sag": lambda rng: {"gravity-sag.c": 1.0},
+    "gravity-sag": _positive("gravity-sag.c"),
+    "joint-azimuth": _of_legs("joint-azimuth"),
     "joint-tilt": _tilt,
     "nest-offset": _nest,
+    "parallelogram-sides": _of_legs("parallelogram-sides"),
     "screw-cyclic": _cyclic,
-    "screw-pitch": lambda rng: _legs("screw-pitch", rng),
+    "screw-pitch": _of_legs("screw-pitch"),
     "screw-twist": _one("screw-twist.L"),
     "settling": _settling,
-    "thermal-growth": lambda rng: {"thermal-growth.a": 1.0},
+    "thermal-growth": _positive("thermal-growth.a"),
     "tracker-drift": _drift,
     "tracker-offset": _one("tracker-offset.r0"),
     "tracker-scale": _one("tracker-scale.k"),
 }
 UNKNOWN: dict[str, Draw] = {
-    "unknown.screw-quadratic": lambda rng: _legs("unknown.screw-quadratic", rng),
-    "unknown.hysteresis": lambda rng: _legs("unknown.hysteresis", rng),
+    "unknown.screw-quadratic": _of_legs("unknown.screw-quadratic"),
+    "unknown.hysteresis": _of_legs("unknown.hysteresis"),
     "unknown.bending": _one("unknown.bending.k"),
     "unknown.soft-legs": _one("unknown.soft-legs.k"),
     "unknown.platform-flex": _one("unknown.platform-flex.k"),
-    "unknown.tide": lambda rng: {
-        "unknown.tide.amplitude": 1.0,
-        "unknown.tide.period": float(rng.uniform(400, 1500)),
-    },
-    "unknown.wobble": lambda rng: {
-        "unknown.wobble.amplitude": 1.0,
-        "unknown.wobble.period": float(rng.uniform(5, 20)),
+    "unknown.tide": _tide,
+    "unknown.wobble": _wobble,
+}
+ABSENT = {
+    "hexapod": {"joint-azimuth", "parallelogram-sides"},
+    "tripod": {
+        "joint-tilt",
+        "screw-twist",
+        "unknown.bending",
+        "unknown.soft-legs",
+        "unknown.platform-flex",  # its platform does not tilt
     },
 }
 FIXED = ("period", "tau", "t0", "where")
@@ -129,22 +156,27 @@ FIXED = ("period", "tau", "t0", "where")
 TRIAL_MM = 0.01
 TRIAL = {
     "gravity-sag": 1e-4, "thermal-growth": 1e-5, "screw-pitch": 1e-3, "screw-twist": 1.0,
-    "settling": 1e-3, "tracker-scale": 1e-5, "joint-tilt": 2e-3, "unknown.screw-quadratic": 1e-5,
-    "unknown.bending": 1e-3, "unknown.soft-legs": 1e-6, "unknown.platform-flex": 1e-2,
+    "settling": 1e-3, "joint-azimuth": 1e-4, "tracker-scale": 1e-5, "joint-tilt": 2e-3,
+    "unknown.screw-quadratic": 1e-5, "unknown.bending": 1e-3, "unknown.soft-legs": 1e-6, "unknown.platform-flex": 1e-2,
 }  # fmt: skip
 """Amplitude of a first trial in the effect's own unit, before it is scaled to a size."""
 
 
-def build(case: Case, poses: object) -> tuple[SimulatedRun, Table]:
-    """Simulate a case; the run, and the hidden table after scaling."""
-    rng = np.random.default_rng([case.seed, 7])
-    plan = RunPlan(
+def _plan(case: Case, poses: object) -> RunPlan:
+    return RunPlan(
+        machine=case.machine,
         seed=case.seed,
         poses=poses,  # type: ignore[arg-type]
         noise_mm=SIGMA_MM,
         profile=PROFILE,
         prior="normal",
     )
+
+
+def build(case: Case, poses: object) -> tuple[SimulatedRun, Table]:
+    """Simulate a case; the run, and the hidden table after scaling."""
+    rng = np.random.default_rng([case.seed, 7])
+    plan = _plan(case, poses)
     empty = simulate(plan)
     hidden: Table = {}
     for name, size in zip(case.effects, case.sizes, strict=True):
@@ -156,7 +188,7 @@ def _scaled(
     plan: RunPlan, empty: SimulatedRun, name: str, size: float, rng: np.random.Generator
 ) -> Table:
     """Amplitudes such that the effect displaces the readings by ``size`` sqrt(3) sigma RMS."""
-    table = (EFFECTS | UNKNOWN)[name](rng)
+    table = (EFFECTS | UNKNOWN)[name](plan.machine, rng)
     span = float(empty.layout.time[-1])
     if "frame-shift.t0" in table:
         table["frame-shift.t0"] *= span
@@ -176,22 +208,17 @@ def _scaled(
 
 def displaced(case: Case, poses: object, hidden: Table) -> np.ndarray:
     """Displacement (3, readings) in mm that a hidden table causes, without noise."""
-    plan = RunPlan(
-        seed=case.seed,
-        poses=poses,  # type: ignore[arg-type]
-        noise_mm=SIGMA_MM,
-        profile=PROFILE,
-        prior="normal",
-    )
+    plan = _plan(case, poses)
     with_it, without = simulate(replace(plan, hidden=Hidden(hidden))), simulate(plan)
     moved = (with_it.xyz - without.xyz)[without.layout.reading]
     return np.asarray(moved.T)
 
 
-def draw_cases(count: int, seed: int, pose_sets: Sequence[str]) -> list[Case]:
+def draw_cases(count: int, seed: int, pose_sets: Sequence[str], machine: str) -> list[Case]:
     """Equal shares over the catalogue at several sizes, pairs, triples, none and unknown ones."""
     rng = np.random.default_rng(seed)
-    names, unknown = sorted(EFFECTS), sorted(UNKNOWN)
+    absent = ABSENT[machine]
+    names, unknown = sorted(EFFECTS.keys() - absent), sorted(UNKNOWN.keys() - absent)
     cases = []
     for number in range(count):
         poses = pose_sets[number % len(pose_sets)]
@@ -200,16 +227,16 @@ def draw_cases(count: int, seed: int, pose_sets: Sequence[str]) -> list[Case]:
         if kind < 5:
             effect = names[(number // 10 * 5 + kind) % len(names)]
             size = (1.0, 1.0, 2.0, 0.5, 4.0)[kind]
-            cases.append(Case(at, (effect,), (size,), poses))
+            cases.append(Case(at, (effect,), (size,), poses, machine=machine))
         elif kind < 7:
-            two = tuple(rng.choice(names, 2, replace=False))
-            cases.append(Case(at, two, (2.0, 2.0), poses))
+            two = tuple(map(str, rng.choice(names, 2, replace=False)))
+            cases.append(Case(at, two, (2.0, 2.0), poses, machine=machine))
         elif kind == 7:
-            three = tuple(rng.choice(names, 3, replace=False))
-            cases.append(Case(at, three, (2.0, 2.0, 2.0), poses))
+            three = tuple(map(str, rng.choice(names, 3, replace=False)))
+            cases.append(Case(at, three, (2.0, 2.0, 2.0), poses, machine=machine))
         elif kind == 8:
-            cases.append(Case(at, (), (), poses))
+            cases.append(Case(at, (), (), poses, machine=machine))
         else:
             effect = unknown[number // 10 % len(unknown)]
-            cases.append(Case(at, (effect,), (2.0,), poses, unknown=True))
+            cases.append(Case(at, (effect,), (2.0,), poses, unknown=True, machine=machine))
     return cases

@@ -32,8 +32,8 @@ def _share(values: Sequence[bool]) -> str:
     return f"{100 * p:.1f} +- {100 * error:.1f} % of {len(values)}"
 
 
-def page(outcomes: Sequence[Any], command: str, seconds: float) -> str:
-    """Markdown text of the page."""
+def page(outcomes: Sequence[Any], machine: str, seconds: float) -> str:
+    """Markdown text of a machine's part of the page."""
     null = [o for o in outcomes if not o.case.effects]
     single = [o for o in outcomes if len(o.case.effects) == 1 and not o.case.unknown]
     size1 = [o for o in single if o.case.sizes[0] == 1.0]
@@ -72,10 +72,9 @@ def page(outcomes: Sequence[Any], command: str, seconds: float) -> str:
         ("time", "1,000 runs < 5 min",
          f"{seconds:.0f} s for {len(outcomes)} runs; discovery {each:.2f} s each"),
     ]  # fmt: skip
-    text = ["# Blind trial", "", f"Written by `{command}`; hexapod.", "",
-            "| | wanted | measured |", "|---|---|---|"]  # fmt: skip
+    text = [f"## {machine}", "", "| | wanted | measured |", "|---|---|---|"]  # fmt: skip
     text += [f"| {what} | {wanted} | {measured} |" for what, wanted, measured in rows]
-    text += ["", "## By effect (single, named first; what was named instead)", "",
+    text += ["", "### By effect (single, named first; what was named instead)", "",
              "| effect | size | runs | right first | named instead | nothing named | power |",
              "|---|---|---|---|---|---|---|"]  # fmt: skip
     table: dict[tuple[str, float], list[Any]] = defaultdict(list)
