@@ -25,6 +25,7 @@ from bench.blind_page import page
 from calib.discover.pairs import power
 from calib.discover.run_discovery import Refitter, RunStage, discover_run, stage_of
 from calib.effects import catalogue
+from calib.errors import BadInput
 from calib.poses.design import design_poses
 from calib.poses.readings import NestReadings
 from calib.runs import parse_header, parse_run
@@ -53,6 +54,7 @@ class Outcome:
     bad: int = 0
     seconds: float = 0.0
     hidden: dict[str, float] = field(default_factory=dict)
+    failure: str = ""
 
 
 @lru_cache(maxsize=8)
@@ -156,10 +158,18 @@ def _foreseen(
     return max(predicted, default=float("nan")), detected, float(np.sqrt(likeness))
 
 
+def attempt(case: Case) -> Outcome:
+    """Solve a case; one that ends in an error counts as wrong and is listed on the page."""
+    try:
+        return solve(case)
+    except (BadInput, ValueError, ArithmeticError) as error:
+        return Outcome(case, True, None, (), (), False, float("nan"), False, failure=str(error))
+
+
 def run_all(cases: Sequence[Case], workers: int) -> list[Outcome]:
     """Solve all cases on several processes."""
     with ProcessPoolExecutor(workers) as pool:
-        return list(pool.map(solve, cases, chunksize=4))
+        return list(pool.map(attempt, cases, chunksize=4))
 
 
 def main() -> None:

@@ -157,7 +157,8 @@ TRIAL_MM = 0.01
 TRIAL = {
     "gravity-sag": 1e-4, "thermal-growth": 1e-5, "screw-pitch": 1e-3, "screw-twist": 1.0,
     "settling": 1e-3, "joint-azimuth": 1e-4, "tracker-scale": 1e-5, "joint-tilt": 2e-3,
-    "unknown.screw-quadratic": 1e-5, "unknown.bending": 1e-3, "unknown.soft-legs": 1e-6, "unknown.platform-flex": 1e-2,
+    "unknown.screw-quadratic": 1e-5, "unknown.bending": 1e-3, "unknown.soft-legs": 1e-6,
+    "unknown.platform-flex": 1e-2,
 }  # fmt: skip
 """Amplitude of a first trial in the effect's own unit, before it is scaled to a size."""
 

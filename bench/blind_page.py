@@ -96,6 +96,9 @@ def page(outcomes: Sequence[Any], machine: str, seconds: float) -> str:
         f"{'declared' if o.unexplained else 'missed'}"
         for o in listed
     ]
+    failures = [o for o in outcomes if o.failure]
+    text += ["", f"Runs that ended in an error: {len(failures)}", ""]
+    text += [f"- {o.case.seed}, {', '.join(o.case.effects)}: {o.failure}" for o in failures]
     alarms = [o for o in null if not o.adequate]
     text += ["", "False alarms: " + (", ".join(
         f"{o.case.seed} {o.first or 'structure'}" for o in alarms) or "none")]  # fmt: skip
