@@ -15,6 +15,7 @@ from calib.errors import BadInput
 from calib.mechanism.closure import Closure, State
 from calib.mechanism.compiled import compile_machine
 from calib.mechanism.description import Machine
+from calib.mechanism.extrapolate import Extrapolation, probe_steps
 from calib.mechanism.householder import Reflectors, factorise
 from calib.mechanism.rigid import Poses, exponential, from_euler, product
 from calib.mechanism.task import task_error, task_rows, task_values
@@ -327,6 +328,39 @@ def home_configuration(machine: Machine) -> Configuration:
     return _run(_Newton(machine, machine.nominal[:, None], extension, state, None, np.zeros(1)))
 
 
+@lru_cache(maxsize=64)
+def _extrapolation(machine: Machine) -> Extrapolation | None:
+    """Series of the nominal machine about home; None where its neighbourhood does not close."""
+    home = home_configuration(machine)
+    near = _solve(machine, home.extension + probe_steps(machine), None, None, home)
+    if not (np.all(home.converged) and np.all(near.converged)):
+        return None
+    return Extrapolation.fit(machine, _places(home), _places(near))
+
+
+def _places(at: Configuration) -> tuple[Array, Array, Array]:
+    return at.poses.position, at.poses.rotation, at.passive
+
+
+def _guess(machine: Machine, extension: Array) -> Configuration:
+    """Where to start for ``extension`` (n, N): extrapolated from home, or home itself."""
+    home, series = home_configuration(machine), _extrapolation(machine)
+    if series is None:
+        return home
+    with np.errstate(all="ignore"):
+        position, rotation, passive = series.guess(extension - home.extension)
+    count = extension.shape[1]
+    return Configuration(
+        Poses(position, rotation),
+        extension,
+        passive,
+        tuple(np.repeat(strain, count, axis=2) for strain in home.strain),
+        np.repeat(home.converged, count),
+        np.zeros(count, dtype=np.intp),
+        np.repeat(home.conditioning, count),
+    )
+
+
 def _state_from(
     start: Configuration, count: int, dtype: np.dtype[np.generic], part: slice
 ) -> State:
@@ -364,7 +398,7 @@ def forward(
     parameters : array, shape (P,) or (P, N), optional
         Geometric parameters; nominal if not given.
     start : Configuration of N poses, or of one, optional
-        Where Newton starts; the home configuration if not given.
+        Where Newton starts; extrapolated from home if not given.
 
     Returns
     -------
@@ -411,6 +445,8 @@ def _solve(
     start: Configuration | None,
 ) -> Configuration:
     held = _columns(parameters, machine)
+    if start is None and extension is not None:
+        start = _guess(machine, np.real(extension))
     start = start or home_configuration(machine)
     asked = extension if extension is not None else target
     assert asked is not None
