@@ -7,7 +7,8 @@ whitened columns, one block for each trial of a nonlinear unknown), and answers 
 """
 
 from calib.discover.candidate import Candidate, Term, fill_missing
-from calib.discover.diagnosis import Diagnosis, Finding, Unexplained, diagnose
+from calib.discover.diagnosis import diagnose
+from calib.discover.findings import Diagnosis, Finding, Unexplained
 from calib.discover.forward import Discovery, Stage, Step, discover
 from calib.discover.problem import LinearProblem
 from calib.discover.quadratic import Blocks, Neighbours, blocks_of

@@ -8,7 +8,8 @@ called for beside the others: one that a later effect has made superfluous is ta
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from calib.discover.diagnosis import ALPHA, Diagnosis
+from calib.discover.diagnosis import ALPHA
+from calib.discover.findings import Diagnosis
 
 MOST_STEPS = 8
 SLACK = 1e-6

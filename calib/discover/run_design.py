@@ -11,11 +11,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.arrays import Array
-from calib.discover.candidate import Candidate, Term
-from calib.discover.diagnosis import Finding, diagnose
+from calib.discover.candidate import Candidate
+from calib.discover.diagnosis import diagnose
 from calib.discover.family import family
+from calib.discover.findings import Finding
 from calib.discover.follow_up import FollowUp, own_to_each_run
-from calib.discover.next_experiment import Blocks, Separation, choose_sequence
+from calib.discover.next_experiment import Blocks, choose_sequence
+from calib.discover.old_and_new import (
+    Side,
+    Together,
+    blocks_of_side,
+    effect_columns_then,
+    matched,
+    rival_of,
+    separation,
+)
 from calib.discover.pairs import power, prefers
 from calib.discover.problem import LinearProblem
 from calib.discover.run_problem import EffectColumns, effect_candidates, effect_columns, problem_of
@@ -23,9 +33,7 @@ from calib.discover.scores import score
 from calib.effects.component import Effect
 from calib.errors import BadInput
 from calib.identify.fitting import Fit
-from calib.model.prediction import at_trial
 from calib.poses.reach import PoseSet, sample_poses
-from calib.runs.stack import Rows
 
 CANDIDATES = 250
 DRAWS = 399
@@ -62,30 +70,6 @@ class Plan:
         return min(self.after.values())
 
 
-@dataclass(frozen=True, eq=False)
-class _Side:
-    """One effect that may be the truth: its columns now, best trial and amplitudes."""
-
-    columns: EffectColumns
-    candidate: Candidate
-    trial: int
-    amplitudes: Array
-    own: bool
-
-    @property
-    def effect(self) -> Effect:
-        return self.columns.effect
-
-    @property
-    def now(self) -> Array:
-        """Columns (k, R) of the readings there are."""
-        return np.asarray(self.candidate.columns[self.trial])
-
-    @property
-    def signature(self) -> Array:
-        return np.asarray(self.amplitudes @ self.now)
-
-
 def design_follow_up(
     fit: Fit,
     effects: Sequence[Effect],
@@ -120,7 +104,9 @@ def design_follow_up(
     """
     sides = _sides(fit, effects, rng)
     poses = sample_poses(fit.model.machine, candidates, rng)
-    before = _chances(problem_of(fit), [side.candidate for side in sides], sides, rng)
+    offered = [_candidate(side, side.now) for side in sides]
+    hidden = [side.signature for side in sides]
+    before = _chances(problem_of(fit), offered, hidden, rng)
     best: Plan | None = None
     for condition in conditions or default_conditions(fit, effects):
         if watch is not None:
@@ -147,7 +133,7 @@ def default_conditions(fit: Fit, effects: Sequence[Effect]) -> list[dict[str, fl
     return found
 
 
-def _sides(fit: Fit, effects: Sequence[Effect], rng: np.random.Generator) -> list[_Side]:
+def _sides(fit: Fit, effects: Sequence[Effect], rng: np.random.Generator) -> list[Side]:
     """Every effect with its size: as estimated where it is seen, else as large as is usual."""
     held = [effect.id for effect in fit.model.effects]
     rows = fit.model.rows
@@ -167,97 +153,38 @@ def _sides(fit: Fit, effects: Sequence[Effect], rng: np.random.Generator) -> lis
     ]
 
 
-def _side(one: EffectColumns, candidate: Candidate, found: Finding, own: bool) -> _Side:
+def _side(one: EffectColumns, candidate: Candidate, found: Finding, own: bool) -> Side:
     trial = one.trials.index(found.trial)
     amplitudes = np.array([estimate.value for estimate in found.estimates])
     if found.p_value > NOT_SEEN:
         amplitudes = candidate.sizes / np.sqrt(candidate.sizes.size)
-    return _Side(one, candidate, trial, amplitudes, own)
+    return Side(one, candidate, trial, amplitudes, own)
 
 
 def _chances(
     problem: LinearProblem,
     candidates: Sequence[Candidate],
-    sides: Sequence[_Side],
+    hidden: Sequence[Array],
     rng: np.random.Generator,
 ) -> dict[str, float]:
-    """Rehearse the decision: the probability of the right answer for each truth."""
-    scores = score(problem, candidates, rng, DRAWS)
-    hidden = [
-        side.amplitudes @ candidate.columns[min(side.trial, len(candidate.trials) - 1)]
-        for side, candidate in zip(sides, candidates, strict=True)
-    ]
-    if len(sides) == 1:
-        alone = family(scores.levels, np.ones(1))
-        return {sides[0].effect.id: power(scores, alone, 0, hidden[0])}
-    return {
-        sides[0].effect.id: prefers(scores, 0, 1, hidden[0]),
-        sides[1].effect.id: prefers(scores, 1, 0, hidden[1]),
-    }
+    """Rehearse the decision: the probability of the right answer for each truth.
 
-
-class _Together:
-    """Old readings and blocks of new ones over one list of unknowns.
-
-    Unknowns in order: those of the fit (geometry, effects in it, old frames), what every run has
-    for itself of the effects in it, the new frame; then the rival's.
+    Nonlinear unknowns stay where they are now: one trial for each candidate.
     """
-
-    def __init__(self, fit: Fit, follow: FollowUp) -> None:
-        self.fit, self.follow = fit, follow
-        model = fit.model
-        self.own = [own_to_each_run(effect, model.rows) for effect in model.effects]
-        new = [
-            [u.sigma or 1e3 * u.size for u in effect.unknowns(follow.rows) if not u.nonlinear]
-            for effect, own in zip(model.effects, self.own, strict=True)
-            if own
-        ]
-        sigmas = np.array([sigma for group in new for sigma in group])
-        self.precision = np.concatenate(
-            [fit.prior_precision, 1.0 / sigmas**2, np.zeros(follow.frame.shape[0])]
-        )
-
-    def old(self) -> Array:
-        """Columns (n, R) of the readings there are."""
-        extra = self.precision.size - self.fit.prior_precision.size
-        return np.concatenate([self.fit.jacobian, np.zeros((extra, self.fit.jacobian.shape[1]))])
-
-    def new(self, rows: Rows) -> Array:
-        """Columns (n, 3, N) of the follow-up, for the way that ``rows`` came."""
-        follow, model = self.follow, self.fit.model
-        shape = follow.geometry.shape[1:]
-        parts, apart = [follow.geometry], []
-        for effect, own, values, group in zip(
-            model.effects, self.own, self.fit.linear.state.effects, model.unknowns, strict=True
-        ):
-            kept = np.zeros((len(group), *shape))
-            linear = np.array([not unknown.nonlinear for unknown in group])
-            if own:
-                count = len(effect.unknowns(follow.rows))
-                apart.append(follow.columns(effect, np.zeros(count), rows))
-            else:
-                kept[linear] = follow.columns(effect, values, rows)
-            parts.append(kept)
-        parts.append(np.zeros((6 * model.frames, *shape)))
-        return np.concatenate([*parts, *apart, follow.frame])
-
-
-def _effect_blocks(side: _Side, follow: FollowUp, rows: Rows) -> tuple[Array, Array]:
-    """Columns (k, 3, N) of an effect in the follow-up, and its displacement (3, N)."""
-    values = at_trial(side.columns.unknowns, side.columns.trials[side.trial])
-    count = len(side.effect.unknowns(follow.rows))
-    if side.own and values.size != count:
-        values = values[:count]
-    columns = follow.columns(side.effect, values, rows)
-    amplitudes = side.amplitudes
-    if amplitudes.size != columns.shape[0]:
-        amplitudes = amplitudes.reshape(-1, columns.shape[0]).mean(axis=0)
-    return columns, np.tensordot(amplitudes, columns, axes=1)
+    scores = score(problem, candidates, rng, DRAWS)
+    names = [candidate.name for candidate in candidates]
+    if len(candidates) == 1:
+        alone = family(scores.levels, np.ones(1))
+        return {names[0]: power(scores, alone, 0, hidden[0])}
+    return {
+        names[0]: prefers(scores, 0, 1, hidden[0]),
+        names[1]: prefers(scores, 1, 0, hidden[1]),
+    }
 
 
 def _planned(
     fit: Fit,
-    sides: Sequence[_Side],
+    sides: Sequence[Side],
     poses: PoseSet,
     count: int,
     condition: Mapping[str, float],
@@ -265,104 +192,64 @@ def _planned(
     rng: np.random.Generator,
 ) -> Plan:
     follow = FollowUp(fit, poses, condition)
-    together = _Together(fit, follow)
+    together = Together(fit, follow)
     start = follow.approached(None)
-    separations = [_separation(side, _rival(sides, side), together, start) for side in sides]
+    separations = [separation(side, rival_of(sides, side), together, start) for side in sides]
 
     def offer(chosen: list[int]) -> list[Blocks]:
         rows = follow.approached(poses.q[:, chosen[-1]] if chosen else None)
         shared = together.new(rows)
-        return [_blocks(side, _rival(sides, side), together, shared, rows) for side in sides]
+        return [
+            blocks_of_side(side, rival_of(sides, side), together, shared, rows) for side in sides
+        ]
 
     chosen = choose_sequence(separations, offer, count)
     after = _rehearsed(sides, together, chosen, rng)
     return Plan(poses.take(np.array(chosen, dtype=np.intp)), dict(condition), before, after)
 
 
-def _rival(sides: Sequence[_Side], side: _Side) -> _Side | None:
-    return next((other for other in sides if other is not side), None)
-
-
-def _precision(together: _Together, rival: _Side | None) -> Array:
-    if rival is None:
-        return together.precision
-    own = rival.candidate.prior_precision
-    return np.concatenate([together.precision, own, own if rival.own else own[:0]])
-
-
-def _with_rival(shared: Array, rival: _Side | None, now: bool, columns: Array | None) -> Array:
-    """Columns with the rival's behind; a drift has unknowns of its own in each run."""
-    if rival is None or columns is None:
-        return shared
-    none = np.zeros_like(columns)
-    if not rival.own:
-        return np.concatenate([shared, columns])
-    return np.concatenate([shared, columns, none] if now else [shared, none, columns])
-
-
-def _separation(side: _Side, rival: _Side | None, together: _Together, rows: Rows) -> Separation:
-    """Readings that there are, and the base nests of the follow-up, which are always read."""
-    follow = together.follow
-    old = _with_rival(together.old(), rival, True, None if rival is None else rival.now)
-    columns = None if rival is None else _effect_blocks(rival, follow, rows)[0]
-    base = _with_rival(together.new(rows), rival, False, _matched(rival, columns))
-    signature = _effect_blocks(side, follow, rows)[1]
-    return Separation(
-        np.concatenate([old, follow.of_base(base)], axis=1),
-        _precision(together, rival),
-        np.concatenate([side.signature, follow.of_base(signature[None])[0]]),
-    )
-
-
-def _matched(rival: _Side | None, columns: Array | None) -> Array | None:
-    """Columns of one run's own unknowns, padded to those of all old runs."""
-    if rival is None or columns is None or columns.shape[0] == rival.amplitudes.size:
-        return columns
-    padded = np.zeros((rival.amplitudes.size, *columns.shape[1:]))
-    padded[: columns.shape[0]] = columns
-    return padded
-
-
-def _blocks(
-    side: _Side, rival: _Side | None, together: _Together, shared: Array, rows: Rows
-) -> Blocks:
-    follow = together.follow
-    columns = None if rival is None else _effect_blocks(rival, follow, rows)[0]
-    nuisance = _with_rival(shared, rival, False, _matched(rival, columns))
-    signature = _effect_blocks(side, follow, rows)[1]
-    return Blocks(follow.by_pose(nuisance), follow.by_pose(signature[None])[:, 0])
-
-
 def _rehearsed(
-    sides: Sequence[_Side], together: _Together, chosen: list[int], rng: np.random.Generator
+    sides: Sequence[Side], together: Together, chosen: list[int], rng: np.random.Generator
 ) -> dict[str, float]:
     """Probabilities of success with old and new readings in one fit."""
     follow = together.follow
     start = follow.approached(None)
     jacobian = [together.old(), follow.of_base(together.new(start))]
-    parts: list[list[Array]] = []
+    then: list[list[Array]] = []
     for side in sides:
-        base = _matched(side, _effect_blocks(side, follow, start)[0])
-        assert base is not None
-        parts.append([side.now, follow.of_base(base)])
+        base = matched(side, effect_columns_then(side, follow, start)[0])
+        then.append([follow.of_base(base)])
     origin: Array | None = None
     for index in chosen:
         rows = follow.approached(origin)
         jacobian.append(follow.by_pose(together.new(rows))[index])
-        for side, blocks in zip(sides, parts, strict=True):
-            here = _matched(side, _effect_blocks(side, follow, rows)[0])
-            assert here is not None
+        for side, blocks in zip(sides, then, strict=True):
+            here = matched(side, effect_columns_then(side, follow, rows)[0])
             blocks.append(follow.by_pose(here)[index])
         origin = follow.poses.q[:, index]
     whole = np.concatenate(jacobian, axis=1)
     problem = LinearProblem(np.zeros(whole.shape[1]), whole, together.precision)
-    candidates = [
-        _candidate(side, np.concatenate(blocks, axis=1))
-        for side, blocks in zip(sides, parts, strict=True)
+    offered = [
+        _candidate(side, side.now, np.concatenate(blocks, axis=1))
+        for side, blocks in zip(sides, then, strict=True)
     ]
-    return _chances(problem, candidates, sides, rng)
+    hidden = [_hidden(side, candidate) for side, candidate in zip(sides, offered, strict=True)]
+    return _chances(problem, offered, hidden, rng)
 
 
-def _candidate(side: _Side, columns: Array) -> Candidate:
-    terms: tuple[Term, ...] = side.candidate.terms
-    return Candidate(side.candidate.name, terms, columns[None], subsets=side.candidate.subsets)
+def _candidate(side: Side, now: Array, then: Array | None = None) -> Candidate:
+    """One effect at its trial over old readings, and new ones; a drift has its own in each."""
+    whole = side.candidate
+    if then is None:
+        return Candidate(whole.name, whole.terms, now[None], subsets=whole.subsets)
+    if not side.own:
+        columns = np.concatenate([now, then], axis=1)
+        return Candidate(whole.name, whole.terms, columns[None], subsets=whole.subsets)
+    columns = np.block([[now, np.zeros((now.shape[0], then.shape[1]))], [np.zeros_like(now), then]])
+    return Candidate(whole.name, whole.terms * 2, columns[None])
+
+
+def _hidden(side: Side, candidate: Candidate) -> Array:
+    """Displacement (R,) of all readings if this effect is the truth."""
+    amplitudes = np.resize(side.amplitudes, len(candidate.terms))
+    return np.asarray(amplitudes @ candidate.columns[0])

@@ -7,7 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from calib.arrays import Array, BoolArray
-from calib.discover.diagnosis import Diagnosis, Finding, diagnose
+from calib.discover.diagnosis import diagnose
+from calib.discover.findings import Diagnosis, Finding
 from calib.discover.run_problem import (
     EffectColumns,
     columns_at,

@@ -7,7 +7,7 @@ import numpy as np
 from scipy import stats
 
 from calib.arrays import Array
-from calib.discover.diagnosis import Diagnosis, Finding
+from calib.discover.findings import Diagnosis, Finding
 from calib.discover.forward import Discovery
 from calib.discover.run_diagnosis import RunDiagnosis
 from calib.discover.run_discovery import RunStage, stage_of

@@ -1,0 +1,128 @@
+"""Records of a diagnosis: what was found of each candidate, and what none explains."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from calib.arrays import Array
+from calib.discover.family import Family
+from calib.discover.scores import Scores
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One unknown's value and standard uncertainty."""
+
+    name: str
+    value: float
+    sigma: float
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """What is known of one candidate.
+
+    Attributes
+    ----------
+    index : int
+        Its place among the candidates that were given.
+    log_p, p_value : float
+        Family-wise.
+    log_evidence : float
+        Log Bayes factor against "nothing missing"; candidates are ranked by it.
+    chi2_fall, dof : float, int
+        Fall of chi-square if the hypothesis with the most evidence is added, and its freedom.
+    trial : tuple of float
+        Values of the nonlinear unknowns with the most evidence.
+    acting : tuple of str
+        Unknowns of the hypothesis with the most evidence (one leg, or all).
+    estimates : tuple of Estimate
+        All linear unknowns of the group at that trial.
+    visible : float
+        Of its signature, the part that the fit has not taken; a ratio of norms, without priors.
+    signature : (R,)
+        Whitened displacement of the readings by the hypothesis with the most evidence.
+    """
+
+    index: int
+    name: str
+    log_p: float
+    log_evidence: float
+    chi2_fall: float
+    dof: int
+    trial: tuple[float, ...]
+    acting: tuple[str, ...]
+    estimates: tuple[Estimate, ...]
+    visible: float
+    signature: Array
+
+    @property
+    def p_value(self) -> float:
+        """Family-wise p-value, no smaller than 1e-300."""
+        return float(np.exp(max(self.log_p, -690.0)))
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """A state variable on which the residual depends; ``period`` where a periodic one is best."""
+
+    channel: str
+    log_p: float
+    log_evidence: float
+    period: float | None = None
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """Structure that no candidate explains, the channels with the most evidence first."""
+
+    significant: bool
+    log_p: float
+    dependences: tuple[Dependence, ...] = ()
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the state variables."""
+        return tuple(dict.fromkeys(found.channel for found in self.dependences))
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """Answer to "what is missing?".
+
+    Attributes
+    ----------
+    findings : tuple of Finding
+        Every candidate, most evidence first.
+    explained_by : tuple of str
+        Candidates that one after the other were significant; empty if none.
+    indistinguishable : tuple of tuples of str
+        For each effect that was significant, itself first, those from which this run would tell
+        it with a probability below 0.8.
+    unexplained : Unexplained
+    unknown_preferred : bool
+        The residual is explained better by structure of unknown origin than by any candidates.
+    adequate : bool
+        Nothing is significant.
+    scatter : float
+        Variance of the readings beyond what was stated, once everything significant is in; 1 is
+        as stated.
+    """
+
+    findings: tuple[Finding, ...]
+    explained_by: tuple[str, ...]
+    indistinguishable: tuple[tuple[str, ...], ...]
+    unexplained: Unexplained
+    unknown_preferred: bool
+    adequate: bool
+    scatter: float
+    scores: Scores = field(repr=False)
+    family: Family = field(repr=False)
+
+    @property
+    def best(self) -> Finding | None:
+        """The effect to add, or None if nothing known is called for."""
+        if self.unknown_preferred or not self.explained_by:
+            return None
+        return next(found for found in self.findings if found.name == self.explained_by[0])
