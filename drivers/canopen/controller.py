@@ -221,8 +221,9 @@ class CanopenController:
     async def move_to_pose(self, pose: tuple[float, ...]) -> tuple[float, ...]:
         """Command a pose and start moving; returns the controller's targets q.
 
-        For the hexapod x, y, z in mm and alpha, beta, gamma in rad, R = Rz(gamma) Ry(beta)
-        Rx(alpha). Raises Refused (limits, unreachable, not enabled) or the standing fault.
+        In the machine's own coordinates: for the hexapod x, y, z in mm and alpha, beta, gamma in
+        rad, R = Rz(gamma) Ry(beta) Rx(alpha); for the ptm tilt and azimuth in rad. Raises Refused
+        (limits, unreachable, not enabled) or the standing fault.
         """
         self.check()
         self._check_numbers(pose, len(self.layout.pose), "pose")

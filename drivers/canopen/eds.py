@@ -17,3 +17,9 @@ def eds_path(name: str) -> Path:
             remedy=f"Name one of {known}, or a path in the site file.",
         )
     return path
+
+
+def drive_eds_path(machine: str) -> Path:
+    """Return the path of the EDS file of a machine's drives: its own, else ``drive402.eds``."""
+    own = EDS_FOLDER / f"{machine}_drive.eds"
+    return own if own.is_file() else eds_path("drive402")

@@ -15,7 +15,7 @@ from drivers.canopen.drive402 import (
     drive_fault,
     state_name,
 )
-from drivers.canopen.eds import eds_path
+from drivers.canopen.eds import drive_eds_path
 from drivers.canopen.layout import Layout
 from drivers.canopen.link import CanLink, Device
 from drivers.canopen.motion import STOP, MotionChannel
@@ -39,7 +39,7 @@ class MachineBus:
         self.layout = layout
         self.controller = link.add_device(node_id, eds, f"controller (node {node_id})")
         self.drives: list[Drive402] = []
-        drive_eds = eds_path("drive402")
+        drive_eds = drive_eds_path(layout.machine)
         for number, name in enumerate(layout.actuators, start=1):
             device = link.add_device(number, drive_eds, f"drive {name} (node {number})")
             self.drives.append(Drive402(device, name))

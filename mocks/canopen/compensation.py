@@ -10,7 +10,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-SMALLEST_CHANGE = 1e-4
 PASSES = 6
 
 
@@ -53,8 +52,8 @@ class Compensation:
         return drive + self.error(drive, direction)
 
 
-def direction_of(change: float, before: int) -> int:
-    """Return the sign of the last change of the commanded extension that was one."""
-    if abs(change) <= SMALLEST_CHANGE:
+def direction_of(change: float, before: int, smallest: float) -> int:
+    """Return the sign of the last change of the commanded extension larger than ``smallest``."""
+    if abs(change) <= smallest:
         return before
     return 1 if change > 0.0 else -1

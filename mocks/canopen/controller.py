@@ -14,8 +14,8 @@ from pathlib import Path
 from canopen.sdo.exceptions import SdoAbortedError
 
 from mocks.canopen.compensation import Compensation, direction_of
-from mocks.canopen.drive402 import COUNTS_PER_MM, PEAK_SPEED, Drive
-from mocks.canopen.hexapod_kinematics import HexapodKinematics, Unreachable
+from mocks.canopen.drive402 import PEAK_SPEED, Drive
+from mocks.canopen.kinematics import kinematics_of
 from mocks.canopen.node import (
     ABORT_RANGE,
     EMCY_HEARTBEAT,
@@ -25,11 +25,12 @@ from mocks.canopen.parameter_server import ParameterServer
 from mocks.canopen.parameters import ParameterSet
 from mocks.canopen.ports import Machine
 from mocks.canopen.state402 import State
+from mocks.canopen.unreachable import Unreachable
 
 SHORTEST_MOVE_S = 0.01
 EMCY_MEMORY = 0x5530
-# A single drive takes its set-point in whole counts.
-SETPOINT_TOLERANCE = 2.0 / COUNTS_PER_MM
+# Counts: a single drive takes its set-point in whole ones.
+SETPOINT_TOLERANCE = 2.0
 ENABLED, MOVING, ARRIVED, FAULTED, ALL_REFERENCED, UNSTORED, INTERRUPTED = (
     1 << 0, 1 << 1, 1 << 2, 1 << 3, 1 << 4, 1 << 5, 1 << 6,
 )  # fmt: skip
@@ -76,8 +77,10 @@ class Controller(StationNode):
         self.parameters = ParameterSet(self.object_dictionary, nvm_path)
         self._server = ParameterServer(self, self.parameters, machine.faults)
         count = len(drives)
-        self._kinematics = HexapodKinematics()
+        self._kinematics = kinematics_of(machine.kind)
         self._axes = range(1, count + 1)
+        self._coordinates = range(1, len(self.object_dictionary[0x2400]))
+        self._tolerance = SETPOINT_TOLERANCE / machine.stroke.counts
         self._direction = [0] * count
         self._wanted = [0.0] * count
         self._setpoints = [0.0] * count
@@ -102,8 +105,9 @@ class Controller(StationNode):
         for axis in self._axes:
             self.readers[0x2411, axis] = partial(self._target, axis - 1)
             self.readers[0x2412, axis] = partial(self._actual, axis - 1)
-            self.writers[0x2400, axis] = partial(self._on_pose, axis)
             self.writers[0x2402, axis] = _check_finite
+        for coordinate in self._coordinates:
+            self.writers[0x2400, coordinate] = partial(self._on_pose, coordinate)
         self.writers |= {
             (0x2401, 2): self._on_command,
             (0x2430, 0): _check_speed,
@@ -149,7 +153,7 @@ class Controller(StationNode):
     def _target(self, n: int) -> float:
         """Where actuator ``n`` is bound for: as commanded, unless it was stopped or homed since."""
         rest = self.drives[n].leg.target
-        if abs(rest - self._setpoints[n]) <= SETPOINT_TOLERANCE:
+        if abs(rest - self._setpoints[n]) <= self._tolerance:
             return self._targets[n]
         return self._reference(n) + self._compensation(n).wanted_for(rest, self._direction[n])
 
@@ -178,7 +182,7 @@ class Controller(StationNode):
             self.halt()
             return Result.ACCEPTED
         if code == Command.MOVE_TO_POSE:
-            complete = len(self._received) == len(self.drives)
+            complete = len(self._received) == len(self._coordinates)
             self._received.clear()
             if not complete:
                 return Result.INCOMPLETE
@@ -194,7 +198,7 @@ class Controller(StationNode):
         return Result.UNKNOWN_COMMAND
 
     def _solve(self) -> list[float]:
-        pose = [self.value(0x2400, axis) for axis in self._axes]
+        pose = [self.value(0x2400, axis) for axis in self._coordinates]
         return self._kinematics.targets(pose, self.parameters.active)
 
     def _outside(self, targets: Sequence[float]) -> int:
@@ -245,11 +249,12 @@ class Controller(StationNode):
     def _notice_other_motion(self, n: int) -> None:
         """Take note of where homing, a stop or a fault has left the drive since."""
         rest = self.drives[n].leg.target
-        if abs(rest - self._setpoints[n]) > SETPOINT_TOLERANCE:
+        if abs(rest - self._setpoints[n]) > self._tolerance:
             self._turn(n, self._compensation(n).wanted_for(rest, self._direction[n]))
 
     def _turn(self, n: int, wanted: float) -> None:
-        self._direction[n] = direction_of(wanted - self._wanted[n], self._direction[n])
+        change, smallest = wanted - self._wanted[n], self.machine.stroke.smallest
+        self._direction[n] = direction_of(change, self._direction[n], smallest)
         self._wanted[n] = wanted
 
     def _prepare(self, axis: int) -> Result:
@@ -260,7 +265,7 @@ class Controller(StationNode):
         self._concerned = self._outside(targets) & 1 << n
         if self._concerned:
             return Result.OUTSIDE_LIMITS
-        self.keep(0x2403, axis, round(self._setpoint(n, q) * COUNTS_PER_MM))
+        self.keep(0x2403, axis, round(self._setpoint(n, q) * self.machine.stroke.counts))
         self._targets = targets
         return Result.ACCEPTED
 

@@ -1,6 +1,6 @@
 """A CiA 402 servo drive that moves one leg.
 
-Positions are extensions in counts of the unit that 0x60A8 states (nm). Modes: 1 profile position
+Positions are extensions in counts of the unit that 0x60A8 states. Modes: 1 profile position
 with the set-point handshake, 6 homing on the index pulse at extension 0, 8 cyclic synchronous
 position, in which the motion controller gives the set-points. Bit 15 of the statusword, free for
 the manufacturer, says that the drive knows its reference.
@@ -15,7 +15,6 @@ from mocks.canopen.node import ABORT_DEVICE_STATE, ABORT_RANGE, EMCY_HEARTBEAT, 
 from mocks.canopen.ports import Leg, Machine
 from mocks.canopen.state402 import Command, State, next_state
 
-COUNTS_PER_MM = 1e6
 PROFILE_POSITION, HOMING, CYCLIC_POSITION = 1, 6, 8
 HOMING_METHODS = (33, 34)
 EMCY_HARDWARE, EMCY_FOLLOWING = 0x5000, 0x8611
@@ -34,6 +33,7 @@ class Drive(StationNode):
         super().__init__(number, eds)
         self.number = number
         self.machine = machine
+        self.counts = machine.stroke.counts
         self.leg: Leg = machine.legs[number - 1]
         self.state = State.SWITCH_ON_DISABLED
         self.mode = 0
@@ -54,8 +54,8 @@ class Drive(StationNode):
             (0x603F, 0): lambda: self.fault_code,
             (0x6041, 0): self.statusword,
             (0x6061, 0): lambda: self.mode,
-            (0x6062, 0): lambda: round(self.leg.target * COUNTS_PER_MM),
-            (0x6064, 0): lambda: round(self.leg.position() * COUNTS_PER_MM),
+            (0x6062, 0): lambda: round(self.leg.target * self.counts),
+            (0x6064, 0): lambda: round(self.leg.position() * self.counts),
         }
         self.writers |= {
             (0x6040, 0): self._on_controlword,
@@ -78,16 +78,16 @@ class Drive(StationNode):
     @property
     def settled(self) -> bool:
         """Whether the leg rests inside the position window of its target."""
-        window = self.value(0x6067) / COUNTS_PER_MM
+        window = self.value(0x6067) / self.counts
         return not self.leg.moving and abs(self.leg.position() - self.leg.target) <= window
 
     def allows(self, extension: float) -> bool:
-        """Whether an extension (mm) is within the software limits 0x607D."""
-        counts = extension * COUNTS_PER_MM
+        """Whether an extension (mm or rad) is within the software limits 0x607D."""
+        counts = extension * self.counts
         return bool(self.value(0x607D, 1) <= counts <= self.value(0x607D, 2))
 
     def follow(self, extension: float, duration_s: float) -> None:
-        """Cyclic position: be at ``extension`` (mm) in ``duration_s`` of machine time."""
+        """Cyclic position: be at ``extension`` in ``duration_s`` of machine time."""
         self.limited = False
         self.leg.command(extension, duration_s)
 
@@ -142,7 +142,7 @@ class Drive(StationNode):
     def _take_setpoint(self, word: int) -> None:
         target = self.value(0x607A)
         if word & RELATIVE:
-            target += round(self.leg.target * COUNTS_PER_MM)
+            target += round(self.leg.target * self.counts)
         self.mode_bit = True
         if self.leg.moving and not word & IMMEDIATELY:
             self._waiting = target
@@ -162,10 +162,10 @@ class Drive(StationNode):
         self._move(self.value(0x607C), self.value(0x6099, 1), self.value(0x609A))
 
     def _move(self, target: int, speed: int, acceleration: int) -> None:
-        way = abs(target - self.leg.position() * COUNTS_PER_MM)
+        way = abs(target - self.leg.position() * self.counts)
         slow = PEAK_SPEED * way / max(speed, 1)
         soft = math.sqrt(PEAK_ACCELERATION * way / max(acceleration, 1))
-        self.leg.command(target / COUNTS_PER_MM, max(slow, soft))
+        self.leg.command(target / self.counts, max(slow, soft))
 
     # ------------------------------------------------------------ what happens by itself
 
@@ -201,7 +201,7 @@ class Drive(StationNode):
         return str(self.number) in self.machine.faults.arguments("drive-fault")
 
     def _follows_badly(self) -> bool:
-        error = abs(self.leg.target - self.leg.position()) * COUNTS_PER_MM
+        error = abs(self.leg.target - self.leg.position()) * self.counts
         powered = self.state is State.OPERATION_ENABLED
         if not (powered and self.leg.stalled and error > self.value(0x6065)):
             self._following_since = None

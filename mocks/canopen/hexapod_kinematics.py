@@ -14,6 +14,8 @@ solved in turn at every pose; each pass gains a factor of about (LB/l)(LP/l) = 1
 import math
 from collections.abc import Mapping, Sequence
 
+from mocks.canopen.unreachable import Unreachable
+
 PHI_B = tuple(math.radians(a) for a in (15.0, 105.0, 135.0, 225.0, 255.0, 345.0))
 PHI_P = tuple(math.radians(a) for a in (45.0, 75.0, 165.0, 195.0, 285.0, 315.0))
 PARAMETERS = ("B_x", "B_y", "B_z", "P_x", "P_y", "P_z", "L0", "L_B", "L_P")
@@ -21,14 +23,6 @@ PASSES = 40
 
 Vector = tuple[float, float, float]
 Rows = tuple[Vector, Vector, Vector]
-
-
-class Unreachable(Exception):
-    """No leg length belongs to the pose with these parameters; ``leg`` counts from 0."""
-
-    def __init__(self, leg: int) -> None:
-        super().__init__(f"leg {leg + 1} does not close")
-        self.leg = leg
 
 
 def rotation(alpha: float, beta: float, gamma: float) -> Rows:
@@ -108,7 +102,7 @@ def leg_lengths(pose: Sequence[float], parameters: Sequence[Sequence[float]]) ->
 class HexapodKinematics:
     """The hexapod's part of a controller: what its limbs are called and how a pose becomes q."""
 
-    limbs = tuple(f"leg{n}" for n in range(1, 7))
+    limbs: tuple[str, ...] = tuple(f"leg{n}" for n in range(1, 7))
 
     def reference(self, n: int, active: Mapping[str, float]) -> float:
         """q of actuator ``n`` (from 0) at extension 0: the L0 that the controller holds."""

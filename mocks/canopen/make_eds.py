@@ -5,6 +5,7 @@ nominal values of its parameters), so that another machine is another file, not 
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from calib.mechanism.description import Machine
 from drivers.canopen.eds import EDS_FOLDER
@@ -24,8 +25,44 @@ TABLE_POINTS = 32
 DRIVE_PRODUCT, CONTROLLER_PRODUCT = 0x402, 0x1000
 
 
-def drive_objects() -> list[Object]:
-    """Return the dictionary of a CiA 402 drive; positions in nm (nrad) of extension."""
+@dataclass(frozen=True)
+class DriveUnits:
+    """In what a drive counts, and what it does by default.
+
+    ``name``: nm or nrad; ``code``: 0x60A8; ``window``: following error; ``speed`` a second,
+    ``acceleration`` a second squared; ``low``, ``high``: software limits; in counts.
+    """
+
+    name: str
+    code: int
+    window: int
+    speed: int
+    acceleration: int
+    low: int
+    high: int
+
+
+LINEAR = DriveUnits("nm", 0xF701_0000, 100_000, 20_000_000, 100_000_000, -36_500_000, 35_100_000)
+
+
+def drive_units(machine: Machine) -> DriveUnits:
+    """Return what the drives of a machine count in: nm and nrad of extension.
+
+    Software limits are the machine file's, with half a percent of the stroke to spare.
+    """
+    first = machine.actuators[0]
+    counts = 1e9 if first.unit == "rad" else 1e6
+    low, high = (counts * (limit - float(first.home)) for limit in first.limits)
+    spare = 0.005 * (high - low)
+    if first.unit == "rad":
+        unit = ("nrad", 0xF710_0000, 300_000, 200_000_000, 400_000_000)
+    else:
+        unit = ("nm", 0xF701_0000, 100_000, 20_000_000, 100_000_000)
+    return DriveUnits(*unit, round(low - spare), round(high + spare))
+
+
+def drive_objects(u: DriveUnits = LINEAR) -> list[Object]:
+    """Return the dictionary of a CiA 402 drive; positions in counts of extension."""
     rw = "rw"
     single = [
         (0x6007, Entry("Abort connection option code", "I16", rw, 2)),
@@ -36,29 +73,29 @@ def drive_objects() -> list[Object]:
         (0x605E, Entry("Fault reaction option code", "I16", rw, 2)),
         (0x6060, Entry("Modes of operation", "I8", rw, 0, "", True)),
         (0x6061, Entry("Modes of operation display", "I8", "ro", 0, "", True)),
-        (0x6062, Entry("Position demand value", "I32", "ro", 0, "nm")),
-        (0x6064, Entry("Position actual value", "I32", "ro", 0, "nm", True)),
-        (0x6065, Entry("Following error window", "U32", rw, 100_000, "nm")),
+        (0x6062, Entry("Position demand value", "I32", "ro", 0, u.name)),
+        (0x6064, Entry("Position actual value", "I32", "ro", 0, u.name, True)),
+        (0x6065, Entry("Following error window", "U32", rw, u.window, u.name)),
         (0x6066, Entry("Following error time out", "U16", rw, 50, "ms machine time")),
-        (0x6067, Entry("Position window", "U32", rw, 100, "nm")),
-        (0x607A, Entry("Target position", "I32", rw, 0, "nm", True)),
-        (0x607C, Entry("Home offset", "I32", rw, 0, "nm")),
-        (0x6081, Entry("Profile velocity", "U32", rw, 20_000_000, "nm/s")),
-        (0x6083, Entry("Profile acceleration", "U32", rw, 100_000_000, "nm/s^2")),
-        (0x6084, Entry("Profile deceleration", "U32", rw, 100_000_000, "nm/s^2")),
-        (0x6085, Entry("Quick stop deceleration", "U32", rw, 1_000_000_000, "nm/s^2")),
+        (0x6067, Entry("Position window", "U32", rw, 100, u.name)),
+        (0x607A, Entry("Target position", "I32", rw, 0, u.name, True)),
+        (0x607C, Entry("Home offset", "I32", rw, 0, u.name)),
+        (0x6081, Entry("Profile velocity", "U32", rw, u.speed, f"{u.name}/s")),
+        (0x6083, Entry("Profile acceleration", "U32", rw, u.acceleration, f"{u.name}/s^2")),
+        (0x6084, Entry("Profile deceleration", "U32", rw, u.acceleration, f"{u.name}/s^2")),
+        (0x6085, Entry("Quick stop deceleration", "U32", rw, 10 * u.acceleration, f"{u.name}/s^2")),
         (0x6098, Entry("Homing method", "I8", rw, 34)),
-        (0x609A, Entry("Homing acceleration", "U32", rw, 100_000_000, "nm/s^2")),
-        (0x60A8, Entry("SI unit position", "U32", "ro", 0xF701_0000)),
+        (0x609A, Entry("Homing acceleration", "U32", rw, u.acceleration, f"{u.name}/s^2")),
+        (0x60A8, Entry("SI unit position", "U32", "ro", u.code)),
         (0x6502, Entry("Supported drive modes", "U32", "ro", 1 << 0 | 1 << 5 | 1 << 7)),
     ]
     limits = [
-        Entry("Min position limit", "I32", rw, -36_500_000, "nm"),
-        Entry("Max position limit", "I32", rw, 35_100_000, "nm"),
+        Entry("Min position limit", "I32", rw, u.low, u.name),
+        Entry("Max position limit", "I32", rw, u.high, u.name),
     ]
     speeds = [
-        Entry("Speed during search for switch", "U32", rw, 20_000_000, "nm/s"),
-        Entry("Speed during search for zero", "U32", rw, 2_000_000, "nm/s"),
+        Entry("Speed during search for switch", "U32", rw, u.speed, f"{u.name}/s"),
+        Entry("Speed during search for zero", "U32", rw, u.speed // 10, f"{u.name}/s"),
     ]
     return [
         *(
@@ -159,7 +196,8 @@ def motion_objects(machine: Machine) -> list[Object]:
         Entry("Result of the last command", "U16", "ro", 0, "", True),
         Entry("Actuators concerned", "U16", "ro", 0, "", True),
     ]
-    speed = Entry("Largest actuator speed", "REAL64", "rw", 20.0, f"{machine.actuators[0].unit}/s")
+    fast = 0.2 if machine.actuators[0].unit == "rad" else 20.0
+    speed = Entry("Largest actuator speed", "REAL64", "rw", fast, f"{machine.actuators[0].unit}/s")
     return [
         array(0x2400, "Commanded pose", pose),
         record(0x2401, "Motion command", command),
@@ -247,15 +285,26 @@ def controller_eds(machine: Machine) -> tuple[str, str]:
     return name, eds_text(name, product, CONTROLLER_PRODUCT, controller_objects(machine))
 
 
-def drive_eds() -> tuple[str, str]:
-    """Return file name and text of the drive's EDS file."""
-    name = "drive402.eds"
-    return name, eds_text(name, "pkmcal mock drive", DRIVE_PRODUCT, drive_objects())
+def drive_eds(machine: Machine | None = None) -> tuple[str, str]:
+    """Return file name and text of the EDS file of a machine's drives (None: of the hexapod's)."""
+    if machine is None:
+        objects, name = drive_objects(), "drive402.eds"
+    else:
+        objects, name = drive_objects(drive_units(machine)), f"{machine.name}_drive.eds"
+    return name, eds_text(name, "pkmcal mock drive", DRIVE_PRODUCT, objects)
+
+
+def shipped_eds() -> list[tuple[str, str]]:
+    """Return names and texts of the EDS files that ship with the program."""
+    ptm = machine_file("ptm")
+    return [
+        drive_eds(), controller_eds(machine_file("hexapod")), drive_eds(ptm), controller_eds(ptm),
+    ]  # fmt: skip
 
 
 def main() -> None:
     """Write the EDS files that ship with the program."""
-    for name, text in (drive_eds(), controller_eds(machine_file("hexapod"))):
+    for name, text in shipped_eds():
         (EDS_FOLDER / name).write_text(text, encoding="utf-8")
 
 

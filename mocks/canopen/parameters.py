@@ -32,7 +32,7 @@ def acceptable(name: str, value: float, default: float) -> bool:
     """Whether ``value`` may be written: finite, and near enough to be meant.
 
     Kinematic parameters within 10 (mm or rad) of the default; pitch within 0.05; lost motion 0..1;
-    a cyclic period 0 (off) or 0.05..100; table points within 1.
+    a cyclic period 0 (off) or 0.01..100; table points within 1.
     """
     if not math.isfinite(value):
         return False
@@ -41,7 +41,7 @@ def acceptable(name: str, value: float, default: float) -> bool:
     if name.startswith("backlash."):
         return 0.0 <= value <= 1.0
     if name.startswith("screw-cyclic-table."):
-        return value == 0.0 or 0.05 <= value <= 100.0 if name.endswith("period") else abs(value) < 1
+        return value == 0.0 or 0.01 <= value <= 100.0 if name.endswith("period") else abs(value) < 1
     return abs(value - default) <= 10.0
 
 

@@ -4,7 +4,7 @@ import threading
 from functools import partial
 from pathlib import Path
 
-from drivers.canopen.eds import eds_path
+from drivers.canopen.eds import drive_eds_path, eds_path
 from mocks.canopen.bus import EndpointBus, StationNetwork
 from mocks.canopen.controller import Controller
 from mocks.canopen.drive402 import Drive
@@ -42,7 +42,7 @@ class CanopenStation:
         self._world = world
         self._bus = EndpointBus(self._silent)
         self.network = StationNetwork(self._bus)
-        drive_eds = eds_path("drive402")
+        drive_eds = drive_eds_path(world.kind)
         self.drives = [Drive(n, drive_eds, world) for n in range(1, len(world.legs) + 1)]
         controller_eds = eds_path(f"{world.kind}_controller")
         self.controller = Controller(CONTROLLER_NODE, controller_eds, world, self.drives, nvm_path)

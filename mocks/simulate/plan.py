@@ -21,9 +21,9 @@ class Profile:
     constant, or a sequence of masses that are put on in turn, each for an equal part of the run.
     """
 
-    start_C: float = 20.0  # noqa: N815 (units)
-    rise_K: float = 6.0  # noqa: N815
-    air_C: float = 20.4  # noqa: N815
+    start_C: float = 20.0
+    rise_K: float = 6.0
+    air_C: float = 20.4
     payload_kg: tuple[float, ...] = (0.0,)
 
 

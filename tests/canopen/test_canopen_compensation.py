@@ -53,7 +53,7 @@ def test_no_period_no_cyclic_error():
 def test_direction_is_the_sign_of_the_last_change_that_was_one():
     direction, seen = 0, []
     for change in (0.0, 5e-5, 1.0, -5e-5, -0.2, 1e-4, 2e-4):
-        direction = direction_of(change, direction)
+        direction = direction_of(change, direction, 1e-4)
         seen.append(direction)
     assert seen == [0, 0, 1, 1, -1, -1, 1]
 
@@ -68,7 +68,7 @@ def test_direction_is_the_sign_of_the_last_change_that_was_one():
         ("screw-pitch.leg1", -0.04, True),
         ("backlash.leg1", -0.01, False),
         ("backlash.leg1", 0.02, True),
-        ("screw-cyclic-table.leg1.period", 0.01, False),
+        ("screw-cyclic-table.leg1.period", 0.005, False),
         ("screw-cyclic-table.leg1.period", 0.0, True),
         ("screw-cyclic-table.leg1.5", 2.0, False),
     ],

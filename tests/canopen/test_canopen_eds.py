@@ -9,14 +9,14 @@ from drivers.canopen.eds import EDS_FOLDER, eds_path
 from drivers.canopen.layout import read_layout
 from drivers.errors import DeviceError
 from mocks.canopen.describe import controller_tables, drive_table
-from mocks.canopen.make_eds import controller_eds, drive_eds
+from mocks.canopen.make_eds import controller_eds, shipped_eds
 from mocks.physics.truth import machine_file, nominal_parameters
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "protocols" / "canopen.md"
 
 
 def test_shipped_files_follow_from_the_machine_file():
-    for name, text in (drive_eds(), controller_eds(machine_file("hexapod"))):
+    for name, text in shipped_eds():
         assert (EDS_FOLDER / name).read_text(encoding="utf-8") == text
 
 
@@ -41,7 +41,7 @@ def test_defaults_are_the_nominal_values():
 
 
 def test_own_objects_are_in_the_manufacturer_s_area_and_pdos_fit():
-    for name in ("hexapod_controller", "drive402"):
+    for name in (Path(name).stem for name, _ in shipped_eds()):
         od = canopen.import_od(str(eds_path(name)), 10)
         for index in od:
             assert 0x1000 <= index < 0x2000 or 0x2000 <= index < 0x6000 or 0x6000 <= index < 0xA000
@@ -71,5 +71,5 @@ def test_document_s_tables_are_those_of_the_files():
 
 
 def test_unknown_eds_file_names_the_known_ones():
-    with pytest.raises(DeviceError, match="drive402, hexapod_controller"):
+    with pytest.raises(DeviceError, match="drive402, hexapod_controller, ptm_controller"):
         eds_path("pentapod")

@@ -8,11 +8,11 @@ from calib.mechanism.solve import inverse
 from mocks.canopen.hexapod_kinematics import (
     PARAMETERS,
     HexapodKinematics,
-    Unreachable,
     leg_length,
     leg_lengths,
     rotation,
 )
+from mocks.canopen.unreachable import Unreachable
 from mocks.physics.truth import draw_parameters, machine_file, nominal_parameters
 
 MACHINE = machine_file("hexapod")

@@ -2,10 +2,14 @@
 
 import asyncio
 
+import numpy as np
+
 from app.session.events import LivePose, PoseCommanded
 from app.session.journal import NewRow
-from app.session.plan import Step
+from app.session.plan import Pose, Step
 from app.session.work import HOME, Done, Work
+from calib.mechanism.rigid import Poses
+from calib.mechanism.task import FULL, task_values
 
 _SAME = 1e-6
 """Actuator targets nearer than this (mm, rad) are the same."""
@@ -39,7 +43,7 @@ async def go(work: Work, label: str) -> None:
     memory = work.memory
     memory.standing_at, memory.settled = None, False
     pose = work.pose(label)
-    q = await work.controller.move_to_pose(pose)
+    q = await work.controller.move_to_pose(_commanded(work, pose))
     memory.q = q
     row = NewRow("move", work.clock.now(), label, q)
     work.journal.add_row(work.step, work.attempt, work.clock.utc(), row)
@@ -53,6 +57,13 @@ async def go(work: Work, label: str) -> None:
     memory.standing_at = label
     memory.arrived_s = work.clock.now()
     work.tell(LivePose(q, q, moving=False))
+
+
+def _commanded(work: Work, pose: Pose) -> tuple[float, ...]:
+    """The coordinates that the controller takes: all six, a position, or tilt and azimuth."""
+    task = work.site.machine.task
+    values = task_values(task, Poses.from_xyz_rpy(np.array(pose)[:, None]))
+    return pose if task.coordinates == FULL else tuple(float(v) for v in values[:, 0])
 
 
 def _timeout(work: Work) -> float:
