@@ -3,7 +3,8 @@
 from app.site import Site
 from drivers.canopen.controller import CanopenController
 from drivers.emscon.tracker import EmsconTracker
-from drivers.gcs.controller import Axes, GcsController
+from drivers.gcs.axes import Axes
+from drivers.gcs.controller import GcsController
 from drivers.interface import MotionController, Tracker
 
 

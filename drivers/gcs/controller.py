@@ -5,42 +5,20 @@ what a controller must offer: docs/protocols/gcs.md.
 """
 
 import asyncio
-import math
-import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 
-from drivers.errors import DeviceError, DeviceFault, DriveFault, LinkError, Refused, Silence
-from drivers.gcs.answers import numbers, registers
+from drivers.errors import DeviceError, DriveFault, Refused
+from drivers.gcs.answers import numbers
+from drivers.gcs.axes import MOVING, SERVO, TRIPOD, Axes, state_name
 from drivers.gcs.connect import check_limits, recognise
-from drivers.gcs.layout import WATCHDOG
-from drivers.gcs.line import ANSWER_S, Line
+from drivers.gcs.line import Line
 from drivers.gcs.link import GcsLink
+from drivers.gcs.motion import Motion
 from drivers.gcs.parameter_access import ParameterAccess
+from drivers.gcs.watch import Watch
 from drivers.interface import ActuatorState, Alarm, ControllerState, Identity
 
-# Bits of status register 1.
-ERROR, SERVO, MOVING, REFERENCING, ON_TARGET = 1 << 8, 1 << 12, 1 << 13, 1 << 14, 1 << 15
-SINGLE_MOTION_S, REST_S, FAREWELL_S, POLL_S = 60.0, 2.0, 1.5, 0.005
-# What a solver may leave of an angle that is meant to be 0.
-LEVEL_RAD = 1e-6
-REMEDY_SERVO = "Remove the cause, clear the faults and enable the machine again."
-
-
-@dataclass(frozen=True)
-class Axes:
-    """Actuator name -> axis of the controller, and the axes of the platform's position."""
-
-    actuators: Mapping[str, str]
-    pose: Sequence[str]
-
-    @property
-    def sliders(self) -> list[str]:
-        """Axes of the actuators, in their order."""
-        return list(self.actuators.values())
-
-
-TRIPOD = Axes({"q1": "A", "q2": "B", "q3": "C"}, "XYZ")
+SINGLE_MOTION_S, FAREWELL_S = 60.0, 1.5
 
 
 class GcsController:
@@ -52,22 +30,17 @@ class GcsController:
     """
 
     def __init__(
-        self,
-        link: GcsLink,
-        identity: Identity,
-        parameters: ParameterAccess,
-        axes: Axes,
-        watchdog_ms: int,
+        self, link: GcsLink, identity: Identity, parameters: ParameterAccess, axes: Axes
     ) -> None:
         self.identity = identity
         self.axes = axes
         self._link = link
         self._device = link.device
         self._parameters = parameters
-        self._watchdog_ms = watchdog_ms
+        watchdog_ms = round(2000.0 * link.silence_s) if parameters.layout.watchdog else 0
+        self._watch = Watch(link, axes, parameters, watchdog_ms)
+        self._motion = Motion(link, axes, self._watch)
         self._callbacks: list[Callable[[Alarm], None]] = []
-        self._targets: tuple[float, ...] = ()
-        self._stopped = False
         link.on_fault = self._on_fault
 
     @classmethod
@@ -114,13 +87,12 @@ class GcsController:
                 wanted = {axes.actuators[name]: pair for name, pair in limits.items()}
                 await link.call(lambda line: check_limits(line, wanted))
             access = ParameterAccess(layout, link.device, level, store_password)
-            watchdog_ms = round(2000.0 * silence_s) if layout.watchdog else 0
-            controller = cls(link, identity, access, axes, watchdog_ms)
-            await link.call(controller._begin_watch)
+            controller = cls(link, identity, access, axes)
+            await link.call(controller._watch.begin)
         except BaseException:
             await link.close()
             raise
-        link.look = controller._look
+        link.look = controller._watch.look
         return controller
 
     def on_alarm(self, callback: Callable[[Alarm], None]) -> None:
@@ -135,63 +107,23 @@ class GcsController:
         for callback in self._callbacks:
             callback(Alarm(fault.device, fault.what, fault.remedy, fault=True))
 
-    # ------------------------------------------------------------ watching
-
-    def _begin_watch(self, line: Line) -> None:
-        if self._watchdog_ms:
-            line.command(f"SPA 1 0x{WATCHDOG:X} {self._watchdog_ms}")
-
-    def _look(self, line: Line, timeout: float) -> None:
-        """Find servos in fault and a controller that was switched off meanwhile; in the worker."""
-        self._note_faults(self._registers(line, timeout))
-        if self._watchdog_ms and self._parameters.whole(line, WATCHDOG, timeout) == 0:
-            self._link.latch(
-                "restart",
-                DeviceFault(
-                    "was switched off and on: what was not stored is lost",
-                    device=self._device,
-                    remedy="Clear the faults, compare the parameters and enable the machine again.",
-                ),
-            )
-
-    def _registers(self, line: Line, timeout: float = ANSWER_S) -> tuple[int, ...]:
-        words = " ".join(f"{axis} 1" for axis in self.axes.sliders)
-        answer = line.query(f"SRG? {words}", timeout)
-        return registers(answer, self.axes.sliders, self._device)
-
-    def _note_faults(self, bits: Sequence[int]) -> None:
-        for name, axis, word in zip(
-            self.axes.actuators, self.axes.sliders, bits, strict=True
-        ):  # fmt: skip
-            if word & ERROR:
-                what = "the servo switched itself off (following error or hardware)"
-                device = f"drive {name} (axis {axis})"
-                fault = DriveFault(what, device=device, remedy=REMEDY_SERVO)
-                self._link.latch(f"drive {name}", fault)
-
-    async def _read_registers(self) -> tuple[int, ...]:
-        bits = await self._link.call(self._registers)
-        self._note_faults(bits)
-        return bits
-
     # ------------------------------------------------------------ state
 
     async def state(self) -> ControllerState:
         """Read a snapshot."""
 
         def read(line: Line) -> tuple[tuple[float, ...], ...]:
-            axes = " ".join(self.axes.sliders)
-            asked = (line.query(f"{what} {axes}") for what in ("POS?", "MOV?", "FRF?"))
-            return tuple(numbers(lines, self.axes.sliders, self._device) for lines in asked)
+            asked = (line.query(f"{what} {self.axes.words}") for what in ("POS?", "MOV?", "FRF?"))
+            return tuple(numbers(lines, self.axes.driven, self._device) for lines in asked)
 
-        bits = await self._read_registers()
+        bits = await self._watch.registers()
         positions, targets, referenced = await self._link.call(read)
         actuators = tuple(
             ActuatorState(
                 name=name,
                 position=positions[n],
                 target=targets[n],
-                state=_state_name(bits[n]),
+                state=state_name(bits[n]),
                 moving=bool(bits[n] & MOVING),
                 homed=bool(referenced[n]),
                 fault=self._fault_of(name),
@@ -214,7 +146,7 @@ class GcsController:
     # ------------------------------------------------------------ power
 
     def _switch(self, on: bool) -> str:
-        return "SVO " + " ".join(f"{axis} {int(on)}" for axis in self.axes.sliders)
+        return "SVO " + " ".join(f"{axis} {int(on)}" for axis in self.axes.driven)
 
     async def enable(self) -> None:
         """Switch all servos on; raises DriveFault, Refused, Silence.
@@ -225,11 +157,11 @@ class GcsController:
         stops = self._link.line.stops
         try:
             await self._link.call(lambda line: line.command(self._switch(True), stops=stops))
-            bits = await self._read_registers()
+            bits = await self._watch.registers()
             self.check()
         except DriveFault:
             await self.disable()
-            await self._read_registers()
+            await self._watch.registers()
             self.check()
             raise
         off = [n for n, word in zip(self.axes.actuators, bits, strict=True) if not word & SERVO]
@@ -239,8 +171,7 @@ class GcsController:
                 device=self._device,
                 remedy="Check the enable inputs and the supply.",
             )
-        # A stop may have come meanwhile.
-        self._stopped = stops != self._link.line.stops
+        self._motion.switched_on(stops)
 
     async def disable(self) -> None:
         """Take the power off all drives; what still moves is stopped."""
@@ -255,39 +186,23 @@ class GcsController:
         if "link" in self._link.faults:
             self._link.check()
         await self._link.call(lambda line: line.synchronise())
-        await self._link.call(self._begin_watch)
+        await self._link.call(self._watch.begin)
         await self.disable()
         self._link.clear_faults()
-        await self._read_registers()
+        await self._watch.registers()
         self.check()
 
     # ------------------------------------------------------------ motion
 
     async def home(self, actuator: str) -> None:
-        """Run one actuator's reference move; raises Refused, DriveFault, Silence."""
-        self.check()
-        axis = self._axis(actuator)
-        await self._start(f"FRF {axis}")
-        n = self.axes.sliders.index(axis)
-        deadline = time.monotonic() + SINGLE_MOTION_S
-        while (await self._read_registers())[n] & REFERENCING:
-            self._link.check()
-            self._need_time(deadline, SINGLE_MOTION_S)
-            await asyncio.sleep(POLL_S)
-        self._link.check()
-        known = await self._link.call(lambda line: line.query(f"FRF? {axis}"))
-        if not numbers(known, axis, self._device)[0]:
-            raise DeviceFault(
-                f"{actuator} was stopped before it found its reference",
-                device=self._device,
-                remedy="Enable the machine and home it again.",
-            )
+        """Run one actuator's reference move; raises Refused, DriveFault, DeviceFault, Silence."""
+        await self._motion.reference(self._axis(actuator), SINGLE_MOTION_S)
 
     async def jog(self, actuator: str, q: float) -> None:
         """Move one actuator alone to ``q`` and wait until it is there."""
-        self._check_numbers((q,), 1, "q")
-        await self._move({self._axis(actuator): q})
-        await self.wait_arrived(SINGLE_MOTION_S)
+        self._motion.check_numbers((q,), 1, "q")
+        await self._motion.to({self._axis(actuator): q})
+        await self._motion.arrived(SINGLE_MOTION_S)
 
     def _axis(self, actuator: str) -> str:
         if actuator not in self.axes.actuators:
@@ -304,49 +219,13 @@ class GcsController:
         x, y, z in mm; three angles may follow and must be 0, for the platform cannot turn. Raises
         Refused (limits, unreachable, not enabled) or the standing fault.
         """
-        count = len(self.axes.pose)
-        position, turn = pose[:count], pose[count:]
-        self._check_numbers(position, count, "pose")
-        if any(abs(angle) > LEVEL_RAD for angle in turn):
-            raise Refused(
-                f"the platform cannot turn, the pose asks for {turn}",
-                device=self._device,
-                remedy="Command poses with rx = ry = rz = 0.",
-            )
-        await self._move(dict(zip(self.axes.pose, position, strict=True)))
-        return self._targets
+        await self._motion.to_position(pose)
+        return self._motion.targets
 
     async def move_to_q(self, q: tuple[float, ...]) -> None:
         """Command all actuators together and start moving; raises Refused."""
-        self._check_numbers(q, len(self.axes.actuators), "q")
-        await self._move(dict(zip(self.axes.sliders, q, strict=True)))
-
-    async def _move(self, targets: Mapping[str, float]) -> None:
-        self.check()
-        words = " ".join(f"{axis} {float(value)!r}" for axis, value in targets.items())
-        await self._start(f"MOV {words}")
-        self._targets = await self._link.call(self._read_targets)
-
-    async def _start(self, command: str) -> None:
-        """Send what starts a motion, unless a stop comes first."""
-        stops = self._link.line.stops
-        if self._stopped:
-            raise Refused(
-                "the machine was stopped", device=self._device, remedy="Enable the machine first."
-            )
-        await self._link.call(lambda line: line.command(command, stops=stops))
-
-    def _read_targets(self, line: Line) -> tuple[float, ...]:
-        axes = self.axes.sliders
-        return numbers(line.query(f"MOV? {' '.join(axes)}"), axes, self._device)
-
-    def _check_numbers(self, values: tuple[float, ...], count: int, what: str) -> None:
-        if len(values) != count or not all(map(math.isfinite, values)):
-            raise Refused(
-                f"{what} needs {count} finite numbers, got {values}",
-                device=self._device,
-                remedy="Nothing was commanded.",
-            )
+        self._motion.check_numbers(q, len(self.axes.actuators), "q")
+        await self._motion.to(dict(zip(self.axes.driven, q, strict=True)))
 
     async def wait_arrived(self, timeout: float) -> None:
         """Wait until every drive reports its target reached; ``timeout`` in wall seconds.
@@ -354,34 +233,7 @@ class GcsController:
         Raises DriveFault or HeartbeatLost (that fault), DeviceFault if the motion was stopped,
         Silence at the deadline, LinkLost.
         """
-        deadline = time.monotonic() + timeout
-        while True:
-            bits = await self._read_registers()
-            self._link.check()
-            if not all(word & SERVO for word in bits):
-                raise self._interrupted()
-            if all(word & ON_TARGET and not word & MOVING for word in bits):
-                break
-            self._need_time(deadline, timeout)
-            await asyncio.sleep(POLL_S)
-        # A controller that was stopped is on target, too: where it stands.
-        if await self._link.call(self._read_targets) != self._targets:
-            raise self._interrupted()
-
-    def _interrupted(self) -> DeviceFault:
-        return DeviceFault(
-            "the motion was stopped before it reached its target",
-            device=self._device,
-            remedy="Enable the machine and command the pose again.",
-        )
-
-    def _need_time(self, deadline: float, timeout: float) -> None:
-        if time.monotonic() > deadline:
-            raise Silence(
-                f"the motion did not end within {timeout} s",
-                device=self._device,
-                remedy="Stop the machine and look at the actuators.",
-            )
+        await self._motion.arrived(timeout)
 
     async def stop(self) -> None:
         """Stop all motion (#24), at any moment; never raises for a second call.
@@ -390,25 +242,7 @@ class GcsController:
         everything is at rest, and :meth:`enable` brings them back. Raises LinkLost or Silence if
         the stop could not be sent or the machine does not come to rest.
         """
-        again, self._stopped = self._stopped, True
-        try:
-            await self._link.stop()
-            await self._rest()
-            await self.disable()
-        except LinkError as error:
-            if not again:
-                raise type(error)(
-                    f"the stop was not confirmed ({error.what})",
-                    device=error.device,
-                    remedy="Use the emergency stop. The controller stops by itself without the PC.",
-                ) from error
-
-    async def _rest(self) -> None:
-        deadline = time.monotonic() + REST_S
-        while await self._link.call(lambda line: line.moving()):
-            if time.monotonic() > deadline:
-                raise Silence("the machine is still moving", device=self._device)
-            await asyncio.sleep(POLL_S)
+        await self._motion.stop(self._switch(False))
 
     # ------------------------------------------------------------ parameters
 
@@ -456,11 +290,4 @@ class GcsController:
     def _farewell(self, line: Line) -> None:
         line.stop()
         line.command(self._switch(False))
-        if self._watchdog_ms:
-            line.command(f"SPA 1 0x{WATCHDOG:X} 0")
-
-
-def _state_name(word: int) -> str:
-    if word & ERROR:
-        return "fault"
-    return "servo on" if word & SERVO else "servo off"
+        self._watch.end(line)

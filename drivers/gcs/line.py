@@ -8,13 +8,15 @@ that cannot come. Lines of an answer end with " \\n", the last one with "\\n".
 import re
 import threading
 import time
-from typing import Protocol
+from collections.abc import Callable
+from typing import Protocol, TypeVar
 
 import serial
 
 from drivers.errors import DeviceFault, LinkLost, ProtocolError, Silence
 from drivers.gcs.errors import refusal
 
+T = TypeVar("T")
 ENCODING = "cp1252"
 ANSWER_S = 1.0
 READ_S, WRITE_S = 0.02, 0.5
@@ -79,7 +81,27 @@ class Line:
             raise refusal(code, text.split(maxsplit=1)[0], self.device)
 
     def query(self, text: str, timeout: float = ANSWER_S) -> list[str]:
-        """Send a query and return the lines of its answer; raises as :meth:`command`."""
+        """Send a query and return the lines of its answer; raises as :meth:`command`.
+
+        A query whose answer is lost or garbled is repeated once.
+        """
+        return self._twice(lambda: self._query(text, timeout), timeout)
+
+    def moving(self) -> bool:
+        """Whether any axis moves (#5); raises as :meth:`query`."""
+        return self._twice(self._moving, ANSWER_S)
+
+    def _twice(self, ask: Callable[[], T], timeout: float) -> T:
+        try:
+            return ask()
+        except (Silence, ProtocolError) as error:
+            try:
+                self.synchronise(timeout)
+            except Silence:
+                raise error from None
+        return ask()
+
+    def _query(self, text: str, timeout: float) -> list[str]:
         self._begin(timeout)
         self._write(f"{text}\nERR?\n")
         answer = self._answer(timeout)
@@ -90,8 +112,7 @@ class Line:
         self._in_step = True
         return answer
 
-    def moving(self) -> bool:
-        """Whether any axis moves (#5)."""
+    def _moving(self) -> bool:
         self._begin(ANSWER_S)
         self._write(MOTION.decode(ENCODING))
         answer = self._answer(ANSWER_S)

@@ -45,7 +45,7 @@ class GcsLink:
         self.on_fault: Callable[[DeviceError], None] = lambda _: None
         self.look: Callable[[Line, float], None] | None = None
         self.closed = False
-        self._silence_s = silence_s
+        self.silence_s = silence_s
         self._loop = asyncio.get_running_loop()
         self._jobs: queue.Queue[Job | None] = queue.Queue()
         self._urgent = ThreadPoolExecutor(1, thread_name_prefix="gcs-stop")
@@ -118,22 +118,17 @@ class GcsLink:
             future.set_exception(error)
 
     def _look(self) -> None:
-        """Ask how the controller is; one answer may get lost, two in a row are a fault."""
+        """Ask how the controller is; an answer may get lost, that to the repetition not."""
         if self.look is None or self.faults.keys() & {"link", "silent"}:
             return
-        for attempt in (1, 2):
-            try:
-                self.look(self.line, 0.5 * self._silence_s)
-                return
-            except LinkLost as error:
-                self.latch("link", error)
-                return
-            except (Silence, ProtocolError) as error:
-                if attempt == 2:
-                    self._lose(error)
-            except DeviceError as error:
-                self.latch("refused", error)
-                return
+        try:
+            self.look(self.line, 0.5 * self.silence_s)
+        except LinkLost as error:
+            self.latch("link", error)
+        except (Silence, ProtocolError) as error:
+            self._lose(error)
+        except DeviceError as error:
+            self.latch("refused", error)
 
     def _lose(self, error: DeviceError) -> None:
         self.latch(

@@ -1,0 +1,35 @@
+"""How a controller calls its axes, and what status register 1 says of one."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+# Bits of status register 1.
+ERROR, SERVO, MOVING, REFERENCING, ON_TARGET = 1 << 8, 1 << 12, 1 << 13, 1 << 14, 1 << 15
+
+
+@dataclass(frozen=True)
+class Axes:
+    """Actuator name -> axis of the controller, and the axes of the platform's position."""
+
+    actuators: Mapping[str, str]
+    pose: Sequence[str]
+
+    @property
+    def driven(self) -> list[str]:
+        """Axes of the actuators, in their order."""
+        return list(self.actuators.values())
+
+    @property
+    def words(self) -> str:
+        """The same, as a command names them."""
+        return " ".join(self.driven)
+
+
+TRIPOD = Axes({"q1": "A", "q2": "B", "q3": "C"}, "XYZ")
+
+
+def state_name(word: int) -> str:
+    """Return a status register in words."""
+    if word & ERROR:
+        return "fault"
+    return "servo on" if word & SERVO else "servo off"
