@@ -1,6 +1,6 @@
 """Blind trial: hidden effects in simulated runs, found without seeing the truth, and scored.
 
-    python bench/blind.py [--cases 400] [--null 400] [--seed 1] [--page docs/blind-trial.md]
+    python -m bench blind [--cases 400] [--null 400] [--seed 1] [--page docs/blind-trial.md]
 
 The runs come from the mock's own physics (`mocks.simulate`), which imports neither the engine nor
 the effects. What is written to the page is measured by this command.
@@ -20,8 +20,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from app.machine_files import load_machine
-from bench.blind_cases import SIGMA_MM, Case, build, displaced, draw_cases
-from bench.blind_page import page
+from bench._blind_cases import SIGMA_MM, Case, build, displaced, draw_cases
+from bench._blind_page import page
 from calib.discover.pairs import power
 from calib.discover.run_discovery import Refitter, RunStage, discover_run, stage_of
 from calib.effects import catalogue
@@ -182,7 +182,7 @@ def main() -> None:
     parser.add_argument("--only", choices=("single", "several", "unknown"))
     parser.add_argument("--page", type=Path)
     options = parser.parse_args()
-    command = f"python -m bench.blind --cases {options.cases} --null {options.null}"
+    command = f"python -m bench blind --cases {options.cases} --null {options.null}"
     text = f"# Blind trial\n\nWritten by `{command} --seed {options.seed}`.\n"
     for machine in options.machines.split(","):
         begin = time.perf_counter()

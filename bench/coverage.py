@@ -1,6 +1,6 @@
 """Is the predicted uncertainty true? Truth drawn anew from the prior in each trial.
 
-    python bench/coverage.py [trials] [run]
+    python -m bench coverage [trials] [run]
 
 Prints, for every parameter, the standard deviation of (estimate - truth) / predicted sigma over
 the trials; 0.9 .. 1.1 is wanted.

@@ -1,6 +1,6 @@
 """Identification against scipy's least squares with 2-point differences on the same residual.
 
-python bench/identify.py
+python -m bench identify
 """
 
 import time
