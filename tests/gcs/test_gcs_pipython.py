@@ -55,7 +55,7 @@ def test_its_client_moves_writes_and_stores(station: GcsStation, gateway):
 def move_write_store(device) -> None:
     assert "pkmcal mock" in device.qIDN()
     assert device.axes == list("XYZABC")
-    device.SVO({axis: 1 for axis in "ABC"})
+    device.SVO(dict.fromkeys("ABC", 1))
     device.MOV({"X": 10.0, "Y": -20.0, "Z": -150.0})
     wait_until(lambda: all(device.qONT().values()))
     assert device.qPOS("Z")["Z"] == pytest.approx(-150.0, abs=1e-9)
@@ -67,7 +67,7 @@ def move_write_store(device) -> None:
     with pytest.raises(pipython.GCSError) as under_power:
         device.SPA("1", L0, 410.5)
     assert under_power.value.val in (60, 95)
-    device.SVO({axis: 0 for axis in "ABC"})
+    device.SVO(dict.fromkeys("ABC", 0))
     device.CCL(1, "advanced")
     device.SPA("1", L0, 410.123456789)
     assert device.qSPA("1", L0)["1"][L0] == 410.123456789
