@@ -168,8 +168,10 @@ def attempt(case: Case) -> Outcome:
 
 def run_all(cases: Sequence[Case], workers: int) -> list[Outcome]:
     """Solve all cases on several processes."""
+    from bench import blind as here  # importable by name in the other processes
+
     with ProcessPoolExecutor(workers) as pool:
-        return list(pool.map(attempt, cases, chunksize=4))
+        return list(pool.map(here.attempt, cases, chunksize=4))
 
 
 def main() -> None:

@@ -42,9 +42,13 @@ def pulls(trials: int, run: Path, seed: int) -> tuple[list[str], np.ndarray]:
 
 def shared(trials: int, run: Path, workers: int) -> tuple[list[str], np.ndarray]:
     """Pulls of all trials, shared among processes with seeds of their own."""
+    from bench import coverage as here  # importable by name in the other processes
+
     share = -(-trials // workers)
     with ProcessPoolExecutor(workers) as pool:
-        parts = list(pool.map(pulls, [share] * workers, [run] * workers, range(1, workers + 1)))
+        parts = list(
+            pool.map(here.pulls, [share] * workers, [run] * workers, range(1, workers + 1))
+        )
     return parts[0][0], np.concatenate([drawn for _, drawn in parts])[:trials]
 
 
