@@ -1,5 +1,8 @@
 """How far the platform is from where it was sent, over a grid of poses (Han et al. 2020, Table 6).
 
+A machine that commands fewer than six coordinates was sent where its controller's parameters put
+the rest: its errors are what those parameters do not know.
+
 The operator's view: each pose is fitted to its nests as the tracker saw them, in the base frame
 that the base nests give. What the tracker's own noise would show for a perfect machine stands
 beside it. The judge's view exists on a mock only: the noise-free truth.
@@ -20,6 +23,9 @@ from app.site import Site, load_site
 from calib.arrays import Array
 from calib.errors import BadInput
 from calib.frames import Frame, fit_frame
+from calib.mechanism.rigid import Poses
+from calib.mechanism.solve import inverse
+from calib.mechanism.task import FULL
 from calib.pose_error import SeenPoints, Summary, noise_peaks, pose_errors, summary
 
 FORMAT = "pkm-verification/1"
@@ -123,7 +129,7 @@ def judge(site: Site, plan: Plan, journal: Journal) -> Verification:
             "no pose was read with three nests",
             remedy="Verify with SMRs in at least three platform nests",
         )
-    wanted = [Frame.of(plan.poses[label]) for label in labels]
+    wanted = _wanted(site, plan, journal, labels)
     points = [_seen(list(seen[label].values()), site.platform_nests) for label in labels]
     back = frame.inverse()
     found = [
@@ -137,6 +143,18 @@ def judge(site: Site, plan: Plan, journal: Journal) -> Verification:
     return Verification(
         labels, position, rotation, 1e3 * peak_mm, float(np.rad2deg(peak_rad)), *truth
     )
+
+
+def _wanted(site: Site, plan: Plan, journal: Journal, labels: tuple[str, ...]) -> list[Frame]:
+    """Where the platform was sent."""
+    machine = site.machine
+    if machine.task.coordinates == FULL:
+        return [Frame.of(plan.poses[label]) for label in labels]
+    held: dict[str, float] = journal.meta("controller_parameters", {})
+    known = {name: v for name, v in held.items() if name in machine.parameter_index}
+    target = Poses.from_xyz_rpy(np.array([plan.poses[label] for label in labels]).T)
+    poses = inverse(machine, target, machine.vector(known)).poses
+    return [Frame(poses.rotation[:, :, k], poses.position[:, k]) for k in range(len(labels))]
 
 
 def _base_frame(site: Site, rows: list[Row]) -> tuple[Frame, SeenPoints]:
