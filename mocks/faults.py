@@ -15,6 +15,9 @@ Names, with what reads them:
 ``write-lost:NAME``                     the controller acknowledges NAME and keeps the old value
 ``reference-lost:N``                    one-shot: drive N forgets where its reference is
 ``store-refused``                       the controller refuses to store its parameters
+``controller-silent``                   a GCS controller reads nothing and answers nothing
+``controller-garbage``                  every answer of a GCS controller is garbage
+``controller-half-line``                one-shot: an answer of a GCS controller breaks off
 ``power-cycle``                         one-shot: the controller and the drives lose their volatile
                                         memory and boot again
 ``tracker-not-initialised``             one-shot: the tracker forgets that it was initialised

@@ -216,7 +216,13 @@ class Line:
 
     def close(self) -> None:
         """Release the port."""
-        self._port.close()
+        connection = getattr(self._port, "_socket", None)
+        try:
+            self._port.close()
+        finally:
+            # pyserial does not get as far as this where the other side is gone.
+            if connection is not None:
+                connection.close()
 
 
 def _end_of_answer(data: bytes) -> int:

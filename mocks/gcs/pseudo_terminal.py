@@ -24,6 +24,7 @@ class PseudoTerminal:
         tty.setraw(self._far)
         os.set_blocking(self._near, False)
         self.path = os.ttyname(self._far)
+        self._closed = False
 
     def read(self, timeout: float) -> bytes:
         """Return what has come within ``timeout`` s; empty if nothing has."""
@@ -37,5 +38,7 @@ class PseudoTerminal:
 
     def close(self) -> None:
         """End the line: whoever has it open gets an error."""
-        for end in (self._near, self._far):
-            os.close(end)
+        if not self._closed:
+            self._closed = True
+            for end in (self._near, self._far):
+                os.close(end)
