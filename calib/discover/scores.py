@@ -25,6 +25,8 @@ from calib.discover.tails import log_tail
 
 BLIND = 1e-8
 """Directions of which less than this (squared norm after / before projection) is left are lost."""
+LEADING = 0.25
+"""Directions in which a group moves the readings by less than this part of the most it can do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,11 +78,15 @@ class Scores:
 
     @cached_property
     def weighings(self) -> list[list[Weighing]]:
-        """For every candidate the whitening of each of its hypotheses."""
-        return [
-            [_weigh(weight, subset) for subset in candidate.hypotheses]
-            for candidate, weight in zip(self.candidates, self.weights, strict=True)
-        ]
+        """For every candidate the whitening of each of its hypotheses; then its leading part."""
+        found = []
+        for candidate, weight, norm in zip(self.candidates, self.weights, self.norms, strict=True):
+            weighings = [_weigh(weight, subset) for subset in candidate.hypotheses]
+            leading = _leading(weight, norm * candidate.sizes)
+            if np.any(leading.dof < weighings[0].dof):
+                weighings.append(leading)
+            found.append(weighings)
+        return found
 
     @cached_property
     def levels(self) -> list[Array]:
@@ -189,6 +195,21 @@ def _weigh(weight: Array, subset: tuple[int, ...]) -> Weighing:
     inverse = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
     whiten = np.swapaxes(vectors, 1, 2) * inverse[:, :, None]
     return Weighing(subset, whiten, seen.sum(axis=1))
+
+
+def _leading(weight: Array, size: Array) -> Weighing:
+    """The whole group without directions in which it hardly moves the readings.
+
+    In units of the unknowns' sizes (T, k) the readings see them along the eigenvectors of D V D.
+    Where a group of many is seen along few directions (two dozen joint tilts along six), the rest
+    adds degrees of freedom and no signal; amplitudes of like size show along the leading ones.
+    """
+    scaled = weight * size[:, :, None] * size[:, None, :]
+    values, vectors = np.linalg.eigh(scaled)
+    seen = values > LEADING**2 * np.maximum(values[:, -1:], 1e-300)
+    inverse = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
+    whiten = np.swapaxes(vectors * size[:, :, None], 1, 2) * inverse[:, :, None]
+    return Weighing(tuple(range(weight.shape[1])), whiten, seen.sum(axis=1))
 
 
 def chi_squares(weighing: Weighing, scores: Array) -> Array:

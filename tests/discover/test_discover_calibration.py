@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 from discover_synthetic import POSES, Lab
+from scipy import stats
 
 from calib.discover import LinearProblem, diagnose, fill_missing
 from calib.discover.diagnosis import DRAWS
 from calib.discover.pairs import power, prefers
+from calib.discover.scores import chi_squares
+from calib.discover.tails import log_tail
 
 SEED = 20
 
@@ -192,3 +195,30 @@ def test_filled_rows_equal_rows_left_out():
     np.testing.assert_allclose(
         columns @ whole.project(columns).T, kept @ left.project(kept).T, rtol=1e-6
     )
+
+
+def test_directions_that_hardly_move_the_readings_cost_nothing():
+    lab = Lab(15)
+    rng = np.random.default_rng(9)
+    faint = 0.01 * rng.normal(size=(9, lab.geometry.shape[1]))
+    columns = np.concatenate([lab.one(lab.x**3, 0)[None], faint])
+    crowd = lab.effect("crowd", columns)
+    hidden = 3.0 * columns[0] * 9.0 / np.linalg.norm(lab.fitted(0.0, rng).project(columns[0]))
+    found = diagnose(lab.fitted(hidden / 6.0, rng), [crowd], rng=rng, draws=199)
+    whole, leading = found.scores.weighings[0]
+    assert (whole.dof[0], leading.dof[0]) == (10, 1)
+    scores = found.scores.scores[0][:, :, :1]
+    falls = [float(chi_squares(weighing, scores)[0, 0]) for weighing in (whole, leading)]
+    assert log_tail(np.array(falls[1:]), 1)[0] < log_tail(np.array(falls[:1]), 10)[0]
+
+
+@pytest.mark.parametrize("dof", [1, 2, 5, 24])
+def test_tails_agree_with_scipy_and_go_on_where_it_underflows(dof):
+    values = np.array([0.0, 0.5, 3.0, 20.0, 150.0, 600.0, 1200.0])
+    np.testing.assert_allclose(
+        log_tail(values, dof), stats.chi2.logsf(values, dof), rtol=1e-3, atol=1e-4
+    )
+    far = log_tail(np.array([1200.0, 5000.0, 20000.0]), dof)
+    slope = np.diff(far) / np.array([3800.0, 15000.0])
+    assert np.all(np.isfinite(far))
+    assert slope == pytest.approx([-0.5, -0.5], abs=0.5 * dof / 1200 + 2e-3)
