@@ -165,7 +165,7 @@ def _serial(nvm: Path | None) -> int:
 
 def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog="python -m mocks.station",
+        prog="pkmcal mock",
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -1,6 +1,8 @@
 """Write a fit to the controller: gates, trial, check poses, and only then keep"""
 
 import asyncio
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +15,11 @@ from app.session.station import Station
 from app.site import Site, load_site
 from app.writeback.gates import LIMITS, Gates
 from app.writeback.procedure import Applied, WriteBack
-from app.writeback.proposal import Proposal
+from app.writeback.proposal import Change, Proposal
 from calib.errors import BadInput
 from calib.pose_error import Summary
+
+TABLE_ENTRY = re.compile(r"(.+-table\.[^.]+)\.\d+")
 
 
 @click.command(
@@ -136,19 +140,38 @@ def _json(proposal: Proposal, applied: Applied | None) -> dict[str, Any]:
 
 
 def table(proposal: Proposal) -> str:
-    """Old, new and difference of every parameter; then what is left out, and why."""
+    """Old, new and difference of every parameter; then what is left out, and why.
+
+    Of a cyclic table only the entry that changes most is shown: 32 lines a leg hide the rest.
+    """
     rows = [
         (
-            c.name, f"{c.old:.5f}", f"{c.new:.5f}", f"{c.new - c.old:+.5f}", f"{c.sigma:.5f}",
+            name, f"{c.old:.5f}", f"{c.new:.5f}", f"{c.new - c.old:+.5f}", f"{c.sigma:.5f}",
             f"{c.in_sigmas:+.1f}", c.unit, "" if c.identified else "mostly its tolerance",
         )
-        for c in proposal.changes
-        if c.old != c.new
+        for name, c in _readable(proposal.changes)
     ]  # fmt: skip
     head = ("parameter", "old", "new", "change", "sigma", "in sigmas", "unit", "")
     lines = [answer.table(head, rows)] if rows else ["nothing to change"]
     lines += [f"not written: {name}: {why}" for name, why in proposal.left_out.items()]
     return "\n".join(lines)
+
+
+def _readable(changes: Sequence[Change]) -> list[tuple[str, Change]]:
+    """Every change with its name; of each table the largest, with the number of its entries."""
+    tables: dict[str, list[Change]] = {}
+    for change in changes:
+        if change.old != change.new:
+            entry = TABLE_ENTRY.match(change.name)
+            tables.setdefault(entry[1] if entry else change.name, []).append(change)
+    return [
+        (f"{name}, most of {len(those)}" if len(those) > 1 else name, max(those, key=_size))
+        for name, those in tables.items()
+    ]
+
+
+def _size(change: Change) -> float:
+    return abs(change.new - change.old)
 
 
 def _words(applied: Applied) -> str:

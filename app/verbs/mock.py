@@ -12,8 +12,12 @@ import click
 def command(arguments: tuple[str, ...]) -> None:
     """Start a station of mock devices as a process of its own and print its addresses.
 
-    All arguments go to the station: pkmcal mock hexapod --seed 7 --json. Ends on Ctrl-C.
+    All arguments go to the station: pkmcal mock hexapod --seed 7 --json. Ends on Ctrl-C. What a
+    person does at a station that runs: pkmcal mock do site.toml payload kg=10.
     """
+    if arguments[:1] == ("do",):
+        hands = subprocess.run([sys.executable, "-m", "mocks.hands", *arguments[1:]], check=False)
+        raise click.exceptions.Exit(hands.returncode)
     station = subprocess.Popen([sys.executable, "-m", "mocks.station", *arguments])
     # Whoever ends this process means the station.
     signal.signal(signal.SIGTERM, lambda *_: station.terminate())

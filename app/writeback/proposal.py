@@ -77,7 +77,7 @@ def propose(machine: Machine, fit: SavedFit, held: Mapping[str, float]) -> Propo
         elif found and all(name in held for name in found):
             changes += [_change(fit, name, held, held[name]) for name in found]
         else:
-            left_out[effect] = "the controller has no compensation for it"
+            left_out[effect] = "the controller has no compensation for it; its error stays"
     return Proposal(tuple(changes), left_out)
 
 

@@ -220,3 +220,24 @@ def test_controller_with_a_memory_keeps_its_serial_number(tmp_path: Path) -> Non
     assert serial("--nvm", first) == number
     assert serial("--nvm", second) != number
     assert serial() != serial()
+
+
+def told(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "app", "mock", "do", *words],
+        capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+
+
+def test_a_person_at_the_command_line_reaches_the_station(
+    station: dict[str, Any], hands: ControlClient, tmp_path: Path
+) -> None:
+    site = tmp_path / "site.toml"
+    site.write_text(f'[hands]\ncontrol = "{station["control"]}"\n', encoding="utf-8")
+    done = told(str(site), "carry", "nest=4", "follow=false")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["ok"]
+    assert "4" in hands("where")["places"].values()
+    refused = told(station["control"], "payload", "kg=-3")
+    assert refused.returncode == 2
+    assert "kg must be between" in refused.stderr
