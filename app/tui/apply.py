@@ -170,11 +170,12 @@ def gates_text(gates: list[GateChecked], wide: bool) -> Content:
     lines = []
     for gate in gates:
         sign, style = ("✓", "$success") if gate.passed else ("✗", "bold $error")
-        if wide:
-            lines.append(Content.assemble((f"{sign} ", style), gate.says))
-        else:
-            numbers = f"{gate.value:6.3g} ≤ {gate.limit:g} {gate.unit}"
-            lines.append(Content.assemble((f"{sign} ", style), f"{gate.gate:<11} {numbers}"))
+        numbers = f"{gate.value:7.3g} ≤ {f'{gate.limit:g} {gate.unit}':<6}"
+        # The numbers stand first: they must be seen, however narrow the screen is.
+        words = gate.says.removeprefix(f"{gate.gate}: ").rpartition(": ")[0] if wide else ""
+        lines.append(
+            Content.assemble((f"{sign} ", style), f"{gate.gate:<11}{numbers} ", (words, "dim"))
+        )
     return Content("\n").join(lines)
 
 

@@ -14,7 +14,6 @@ from typing import Any, TypeVar
 
 from app.errors import GateRefused, StoppedByOperator
 from app.session import events as ev
-from app.session.events import DeviceStates
 from app.session.plan import Plan
 from app.session.session import Outcome, Session
 from app.session.station import Station
@@ -163,11 +162,20 @@ class Desk:
         if self.station is not None and self.station.connected:
             await self.station.close()
 
-    async def poll(self) -> DeviceStates | None:
-        """Ask for the devices' states, but never into a running job: that tells by itself."""
-        if self.connected and not self.busy and self.station is not None:
-            return await self.station.poll()
-        return None
+    async def poll(self) -> None:
+        """Ask for the devices' states, but never into a running job: that tells by itself.
+
+        Where neither answers any more, both are let go, so that they can be connected anew.
+        """
+        if not self.connected or self.busy or self.station is None:
+            return
+        states = await self.station.poll()
+        if states.controller is None and states.tracker is None and not self.busy:
+            await self.station.close()
+            self.picture.say_trouble(
+                "Neither controller nor tracker answers",
+                "Look at power and network, then connect again (c on the Devices screen)",
+            )
 
     async def clear_faults(self) -> None:
         """Reset standing faults of the drives; they stay without power."""

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import Horizontal, Vertical
+from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.content import Content
 from textual.widgets import DataTable, Static
 
@@ -16,6 +16,7 @@ from app.tui.discovering import Search, Stair, View
 from app.tui.face import Face
 from app.tui.picture import Picture
 from app.tui.widgets.plots import BinPlot
+from app.tui.wording import p_text
 
 STAIRS = 4
 """How many of the last steps are shown."""
@@ -59,7 +60,8 @@ class DiscoverFace(Face):
         yield Static(id="advice", classes="panel")
         with Vertical(id="discover-low"):
             yield DataTable(id="candidates", cursor_type="row", zebra_stripes=True)
-            yield Static(id="found", classes="panel")
+            with VerticalScroll(id="found", classes="panel", can_focus=False):
+                yield Static(id="found-text")
 
     def on_mount(self) -> None:
         """Name the panels."""
@@ -77,10 +79,10 @@ class DiscoverFace(Face):
         if drawn == self._drawn:
             return
         self._drawn = drawn
-        self.query_one("#stairs", Static).update(stairs_text(search, 26 if self.wide else 7))
+        self.query_one("#stairs", Static).update(stairs_text(search, 12 if self.wide else 7))
         self.query_one("#fails", Static).update(fails_text(view, self._shown, self.wide))
         self.query_one("#advice", Static).update(advice_text(view))
-        self.query_one("#found", Static).update(found_text(view))
+        self.query_one("#found-text", Static).update(found_text(view))
         self._fill(view)
         if view is not None:
             structure = view.comparison["structure"]
@@ -164,7 +166,7 @@ def stairs_text(search: Search | None, room: int) -> Content:
         )
     shown = search.stairs[-STAIRS:]
     top = max(stair.rms_um for stair in search.stairs)
-    legend = "  ░ noise █ left" if room > 20 else ""
+    legend = " ░noise █left" if room > 10 else ""
     lines = [Content.from_markup("[dim]$head[/]", head=f"{'RMS':>20} held out{legend}")]
     for number, stair in enumerate(shown):
         line = f"{_cut(stair.did, 14):<14}{stair.rms_um:6.2f}{_um(stair.holdout_um)} "
@@ -201,11 +203,11 @@ def fails_text(view: View | None, shown: int, wide: bool) -> Content:
         sign, style = ("!", "$warning") if each["significant"] else ("·", "dim")
         period = f", period {each['period']:.3g}" if each["period"] else ""
         mark = "▸" if wide and number == shown % len(structure) else " "
-        p = f"   p {each['p_value']:.1g}" if wide else ""
-        name = _cut(each["channel"] + period, 22)
+        p = f"  p {p_text(each['p_value'])}" if wide else ""
+        name = _cut(each["channel"] + period, 20)
         lines.append(
             Content.assemble(
-                (f"{mark}{sign} ", style), f"{name:<22}{each['explains_um']:5.1f} µm", (p, "dim")
+                (f"{mark}{sign} ", style), f"{name:<20}{each['explains_um']:5.1f} µm", (p, "dim")
             )
         )
     repeats = view.comparison["repeatability"]
@@ -230,11 +232,14 @@ def found_text(view: View | None) -> Content:
     """Effects in the model with their sizes."""
     if view is None or not view.effects:
         return Content.from_markup("[dim]geometry only[/]")
-    lines = [Content.assemble((", ".join(view.effects), "bold"))]
-    lines += [
-        Content(f"{p['name']} = {p['value']:.4g} ± {p['sigma']:.2g} {p['unit']}")
-        for p in view.parameters
-    ]
+    lines = []
+    for effect in view.effects:
+        lines.append(Content.assemble((effect, "bold")))
+        for each in view.parameters:
+            if each["name"].startswith(f"{effect}."):
+                name = each["name"].removeprefix(f"{effect}.")
+                size = f"{each['value']:9.3g} ± {each['sigma']:.1g} {each['unit']}"
+                lines.append(Content(f"  {name:<10}{size}"))
     return Content("\n").join(lines)
 
 
@@ -246,7 +251,7 @@ def candidate_row(candidate: dict[str, Any]) -> list[Text]:
     sizes = [f"{p['value']:.3g} ± {p['sigma']:.1g} {p['unit']}" for p in candidate["parameters"]]
     more = f" (+{len(sizes) - 1})" if len(sizes) > 1 else ""
     numbers = (
-        f"{candidate['p_value']:.1g}",
+        p_text(candidate["p_value"]),
         f"{candidate['rms_after_um']:.2f}" if candidate["rms_after_um"] is not None else "-",
         f"{held:.2f}" if held is not None else "-",
         f"{100 * candidate['visible']:.0f} %",

@@ -45,7 +45,7 @@ class MeasureFace(Face):
             with Vertical(id="measure-right"):
                 yield Static(id="now", classes="panel")
                 yield MissPlot("Readings: distance from prediction, µm", id="miss")
-                yield ScatterPlot("Scatter while settling, µm", id="scatter")
+                yield ScatterPlot("Scatter while settling, µm, the last readings", id="scatter")
 
     def on_mount(self) -> None:
         """Name the panel."""
@@ -164,9 +164,9 @@ def _legs(picture: Picture, wide: bool) -> Content:
 
 
 def _scatter(picture: Picture) -> Content:
-    if not picture.scatter:
+    last = picture.settling
+    if last is None:
         return Content("-")
-    last = picture.scatter[-1]
     filled = min(8, round(8 * last.std_mm / last.limit_mm)) if last.limit_mm > 0 else 8
     bar = "█" * filled + "░" * (8 - filled)
     word = ("settled", "$success") if last.settled else ("settling", "$warning")

@@ -15,7 +15,7 @@ from app.session.session import Session
 from drivers.interface import Alarm
 
 KEPT = 2000
-SCATTER_KEPT = 120
+SCATTER_KEPT = 240
 
 RunState = Literal["idle", "running", "paused", "waiting", "stopped", "fault", "finished"]
 StepMark = Literal["planned", "started", "done", "failed", "skipped"]
@@ -87,6 +87,7 @@ class Picture:
     pose: ev.PoseCommanded | None = None
     live: ev.LivePose | None = None
     scatter: "deque[ev.LiveScatter]" = field(default_factory=lambda: deque(maxlen=SCATTER_KEPT))
+    settling: ev.LiveScatter | None = None
     points: list[Point] = field(default_factory=list)
     last_reading: ev.ReadingTaken | None = None
     rejected: int = 0
@@ -107,7 +108,7 @@ class Picture:
         self.purpose, self.title = session.plan.purpose, session.plan.title
         self.run, self.current, self.progress, self.trouble = "running", None, None, None
         self.points, self.rejected, self.last_reading = [], 0, None
-        self.frame = self.drift = self.pose = self.live = None
+        self.frame = self.drift = self.pose = self.live = self.settling = None
         self.scatter.clear()
         self.revision += 1
 
@@ -177,6 +178,9 @@ def _states(picture: Picture, event: ev.DeviceStates) -> None:
 
 def _alarm(picture: Picture, event: ev.AlarmRaised) -> None:
     alarm = event.alarm
+    before = next((old for _, old in reversed(picture.alarms) if old.device == alarm.device), None)
+    if alarm == before and picture.run != "running":
+        return  # a device that says the same again and again is heard once
     picture.alarms.append((event.time_s, alarm))
     level: Level = "bad" if alarm.fault else "warn"
     text = f"{alarm.device}: {alarm.what}"
@@ -219,7 +223,7 @@ def _progress(picture: Picture, event: ev.Progress) -> None:
 
 def _pose(picture: Picture, event: ev.PoseCommanded) -> None:
     picture.pose = event
-    picture.scatter.clear()
+    picture.settling = None
 
 
 def _live(picture: Picture, event: ev.LivePose) -> None:
@@ -228,6 +232,7 @@ def _live(picture: Picture, event: ev.LivePose) -> None:
 
 def _scatter(picture: Picture, event: ev.LiveScatter) -> None:
     picture.scatter.append(event)
+    picture.settling = event
 
 
 def _reading(picture: Picture, event: ev.ReadingTaken) -> None:

@@ -24,3 +24,8 @@ def channel_text(channels: Mapping[str, Any]) -> str:
         label = " ".join(words if unit else [*words, last])
         parts.append(f"{label} {value:.2f} {unit}".rstrip())
     return "   ".join(parts)
+
+
+def p_text(p: float) -> str:
+    """Render a probability in at most five signs: ``5e-81``, ``0.02``, ``1``."""
+    return f"{p:.0e}" if p < 0.001 else f"{p:.1g}"

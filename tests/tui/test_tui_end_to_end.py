@@ -33,7 +33,7 @@ async def until(pilot: Pilot[Any], true: Callable[[], bool], seconds: float) -> 
                 await asyncio.sleep(0.05)
     except TimeoutError:
         lines = [line.text for line in bench.desk.picture.log][-12:]
-        pytest.fail("\n".join(["it did not happen; the log ends with", *lines]))
+        pytest.fail("\n".join([f"not yet; {bench.desk.picture.run}; the log ends:", *lines]))
     await pilot.pause()
 
 

@@ -1,5 +1,6 @@
 """Plots that grow while the machine measures: decimated, redrawn only when there is news."""
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
@@ -47,7 +48,10 @@ class MissPlot(QuietPlot):
         if not self.changed((len(points), points[-1].number if points else 0)):
             return
         self.clear()
+        self.border_subtitle = ""
         if not points:
+            self.set_xlimits(0, 10)
+            self.set_ylimits(0, 1)
             return
         top = max(point.miss_mm for point in points) * 1000.0
         self.set_xlimits(0, max(10, points[-1].number + 1))
@@ -128,13 +132,27 @@ class BinPlot(QuietPlot):
         sigma = np.array([each["sigma"] for each in bins])
         reach = float(np.max(np.abs(y) + sigma)) * 1.1
         self.set_ylimits(-reach, reach)
+        self.set_xticks(few_ticks(float(x[0]), float(x[-1])))
         self.plot(x[[0, -1]], np.zeros(2), line_style="#7d8d9a", hires_mode=HiResMode.BRAILLE)
         self.errorbar(x, y, yerr=sigma, marker="o", marker_style="#e8b45a")
         over = structure["channel"]
         if structure["period"]:
-            over += f" modulo {structure['period']:.3g}"
-        unit = structure["unit"].replace("um", "µm").replace("urad", "µrad")
-        self.border_title = f"{structure['shows_in']}, {unit}, over {over}"
+            over += f" mod {structure['period']:.3g}"
+        unit = "µrad" if structure["unit"] == "urad" else "µm"
+        shows = structure["shows_in"].removeprefix("extension of ")
+        self.border_title = f"{shows}, {unit}, over {over}"
+
+
+def few_ticks(low: float, high: float, most: int = 4) -> list[float]:
+    """Round numbers from ``low`` to ``high``, at most ``most``: their labels must not touch."""
+    span = high - low
+    if not span > 0.0:
+        return [low]
+    decade = 10.0 ** math.floor(math.log10(span))
+    steps = (decade * part for part in (0.2, 0.5, 1.0, 2.0, 5.0))
+    step = next(s for s in steps if math.floor(high / s) - math.ceil(low / s) < most)
+    first, last = math.ceil(low / step), math.floor(high / step)
+    return [step * number for number in range(first, last + 1)]
 
 
 def thin(x: Array, y: Array, most: int) -> tuple[Array, Array]:

@@ -1,0 +1,113 @@
+"""Take the pictures of docs/terminal-ui.md: the program, driven by keys, on a mock machine.
+
+python docs/images/take_screenshots.py        (about three minutes)
+"""
+
+import asyncio
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from textual.pilot import Pilot
+from textual.widgets import Input
+
+from app.tui.dialogs import Ask
+from app.tui.program import Workbench
+
+HERE = Path(__file__).parent
+MYSTERY = HERE.parent.parent / "tests" / "data" / "runs" / "mystery"
+SIZE = (120, 38)
+MOCK = "hexapod --seed 7 --scale 150 --smrs 3"
+
+
+class Photographer:
+    """Presses keys, waits, takes pictures."""
+
+    def __init__(self, bench: Workbench, pilot: Pilot[Any]) -> None:
+        self.bench = bench
+        self.pilot = pilot
+
+    async def until(self, true: Callable[[], bool]) -> None:
+        """Wait for a condition, at most three minutes."""
+        async with asyncio.timeout(180.0):
+            while not true():  # noqa: ASYNC110 - a condition of many parts, none an event
+                await asyncio.sleep(0.05)
+        await self.pilot.pause(0.4)
+
+    async def keys(self, *keys: str) -> None:
+        """Press keys one by one, with time to see what they do."""
+        for key in keys:
+            await self.pilot.press(key)
+            await self.pilot.pause(0.3)
+
+    async def picture(self, name: str) -> None:
+        """Write what is on the screen."""
+        await self.pilot.pause(0.4)
+        self.bench.save_screenshot(f"{name}.svg", path=str(HERE))
+
+
+async def connect_and_measure(photographer: Photographer) -> None:
+    """Devices, a first verification, and a measurement with the plot half full."""
+    bench, desk = photographer.bench, photographer.bench.desk
+    await photographer.keys("m")
+    bench.screen.query_one(Input).value = MOCK
+    await photographer.keys("enter")
+    await photographer.until(lambda: desk.connected)
+    await photographer.keys("6", "v", "q")
+    await photographer.until(lambda: desk.after is not None)
+    await photographer.keys("2", "n", "enter")
+    await photographer.until(lambda: desk.picture.purpose == "measure")
+    await photographer.until(lambda: len(desk.picture.points) > 55)
+    await photographer.picture("measure")
+    await photographer.keys("1")
+    await photographer.picture("devices")
+    await photographer.until(lambda: desk.picture.run == "finished")
+
+
+async def correct(photographer: Photographer) -> None:
+    """Fit, apply, verify."""
+    bench, desk = photographer.bench, photographer.bench.desk
+    await photographer.keys("3", "f")
+    await photographer.until(lambda: desk.study.answer is not None)
+    await photographer.picture("fit")
+    await photographer.keys("5", "c")
+    await photographer.until(lambda: desk.corrections.comparison is not None)
+    await photographer.keys("a", "a")
+    await photographer.until(lambda: isinstance(bench.screen, Ask))
+    await photographer.picture("apply")
+    await photographer.keys("k")
+    await photographer.until(lambda: desk.picture.run == "finished")
+    await photographer.keys("6", "v", "q")
+    await photographer.until(lambda: desk.before is not None)
+    await photographer.picture("verify")
+
+
+async def discover(photographer: Photographer) -> None:
+    """The mystery run: what is missing, and the staircase."""
+    study = photographer.bench.desk.study
+    study.choose((str(MYSTERY),))
+    await photographer.keys("4", "d")
+    await photographer.until(lambda: study.search is not None)
+    await photographer.picture("discover-asked")
+    await photographer.keys("g")
+    await photographer.until(lambda: len(study.effects) > 1)
+    await photographer.picture("discover")
+
+
+async def main() -> None:
+    """Take all pictures, in a folder of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["PKMCAL_STATE"] = str(Path(folder) / "state")
+        bench = Workbench(root=Path(folder) / "sessions")
+        async with bench.run_test(size=SIZE) as pilot:
+            photographer = Photographer(bench, pilot)
+            await connect_and_measure(photographer)
+            await correct(photographer)
+            await discover(photographer)
+            await bench.desk.close()
+
+
+if __name__ == "__main__":
+    asyncio.run(main())

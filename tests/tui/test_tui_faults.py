@@ -1,0 +1,58 @@
+"""Bad days, through the wires: the screen says what happened, what to do, and stays alive."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+from test_tui_end_to_end import SCALE, new_run, start_mock, until
+
+from app.session.hands import MockControl
+from app.tui.program import Workbench
+from app.tui.widgets.frame import Banner
+
+
+@pytest.fixture(autouse=True)
+def own_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PKMCAL_STATE", str(tmp_path / "state"))
+
+
+async def test_station_that_dies_in_a_run(tmp_path: Path) -> None:
+    bench = Workbench(root=tmp_path / "sessions")
+    desk = bench.desk
+    async with bench.run_test(size=(80, 24)) as pilot:
+        await start_mock(pilot, bench, f"hexapod --seed 5 --scale {SCALE} --smrs 3")
+        await new_run(pilot, bench, "29")
+        await until(pilot, lambda: len(desk.picture.points) > 2, 30.0)
+        assert desk.mock is not None
+        desk.mock.kill()
+        await until(pilot, lambda: desk.picture.run == "fault", 20.0)
+        await pilot.pause(0.5)
+        trouble = desk.picture.trouble
+        assert trouble is not None
+        assert trouble.what
+        assert trouble.remedy
+        assert bench.screen.query_one(Banner).display
+        await pilot.press("ctrl+x", "7")
+        await pilot.pause(0.3)
+        assert bench.current_mode == "log"
+        await desk.close()
+
+
+async def test_beam_that_is_broken_is_waited_for(tmp_path: Path) -> None:
+    bench = Workbench(root=tmp_path / "sessions")
+    desk = bench.desk
+    async with bench.run_test(size=(80, 24)) as pilot:
+        await start_mock(pilot, bench, f"hexapod --seed 5 --scale {SCALE} --smrs 3")
+        assert desk.site is not None
+        control = MockControl(desk.site.hands.host, desk.site.hands.port)
+        await new_run(pilot, bench, "29")
+        await until(pilot, lambda: len(desk.picture.points) > 2, 30.0)
+        read = len(desk.picture.points)
+        await control.call("break-beam", for_s=1.5 * SCALE)
+        await until(pilot, lambda: any("beam" in line.text for line in desk.picture.log), 20.0)
+        async with asyncio.timeout(30.0):
+            while len(desk.picture.points) < read + 4:  # noqa: ASYNC110 - a plain value
+                await asyncio.sleep(0.05)
+        await pilot.press("ctrl+x")
+        await until(pilot, lambda: desk.picture.run == "stopped", 10.0)
+        await desk.close()

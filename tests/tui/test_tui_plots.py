@@ -1,0 +1,35 @@
+"""What is left out of a plot, and what never is."""
+
+import numpy as np
+import pytest
+
+from app.tui.widgets.frame import duration
+from app.tui.widgets.plots import few_ticks, thin
+
+
+def test_thinning_keeps_the_outlier() -> None:
+    generator = np.random.default_rng(4)
+    x = np.arange(5000.0)
+    y = generator.normal(size=5000)
+    y[1234] = -40.0
+    kept_x, kept_y = thin(x, y, 400)
+    assert len(kept_x) == 400
+    assert 1234.0 in kept_x
+    assert kept_y.min() == -40.0
+    assert np.all(np.diff(kept_x) > 0)
+
+
+def test_few_points_stay_as_they_are() -> None:
+    x = np.arange(10.0)
+    assert thin(x, x, 400)[0] is x
+
+
+@pytest.mark.parametrize("size", [1e-6, 0.04, 3.7, 850.0])
+def test_ticks_are_few_and_inside(size: float) -> None:
+    ticks = few_ticks(-0.3 * size, size)
+    assert 1 <= len(ticks) <= 4
+    assert -0.3 * size <= ticks[0] <= ticks[-1] <= size
+
+
+def test_time_spans_in_words() -> None:
+    assert [duration(s) for s in (45.0, 600.0, 7500.0)] == ["45 s", "10 min", "2 h 05"]
