@@ -96,7 +96,9 @@ def _of_reading(fit: Fit) -> list[Variable]:
     seats = seats * rows.on_platform
     labels = {name: number for number, name in enumerate(dict.fromkeys(rows.nest_name))}
     nest = np.array([labels[name] for name in rows.nest_name], dtype=np.float64)[kept]
-    legs = Carrier("legs", _flat(situation.actuator_columns[:, :, kept]))
+    unit = rows.machine.actuators[0].unit
+    moved = _flat(situation.actuator_columns[:, :, kept])
+    legs = Carrier("legs", moved, unit, 0.01 if unit == "mm" else 1e-4)
     found = [
         Variable("range", np.tile(np.sqrt(x**2 + y**2 + z**2), 3), (points,)),
         Variable("azimuth", np.tile(np.unwrap(np.arctan2(y, x)), 3), (points,)),
