@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from app.machine_files import load_machine
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
@@ -80,7 +82,14 @@ def read_run(folder: str | Path) -> LoadedRun:
 def read_runs(folders: tuple[str, ...]) -> list[LoadedRun]:
     """Read several runs of one machine; raises BadInput where two machines are mixed."""
     loaded = [read_run(folder) for folder in folders]
-    for other in loaded[1:]:
+    for place, other in enumerate(loaded[1:], start=1):
+        for first in loaded[:place]:
+            if np.array_equal(first.run.position, other.run.position, equal_nan=True):
+                raise BadInput(
+                    f"the readings are those of {first.folder}",
+                    place=str(other.folder / POINTS),
+                    remedy="Name every run once: readings must not count twice",
+                )
         if other.machine.parameters != loaded[0].machine.parameters:
             raise BadInput(
                 f"machine {other.run.header.machine!r}, but {loaded[0].folder} has "
@@ -89,6 +98,21 @@ def read_runs(folders: tuple[str, ...]) -> list[LoadedRun]:
                 remedy="Fit runs of one machine together",
             )
     return loaded
+
+
+def outside_runs(path: Path | None, folders: tuple[str, ...]) -> None:
+    """Refuse to write into a run's folder: runs are never written to; raises BadInput."""
+    if path is None:
+        return
+    for folder in folders:
+        at = Path(folder).resolve()
+        at = at.parent if at.name == HEADER else at
+        if path.resolve() == at or at in path.resolve().parents:
+            raise BadInput(
+                "this lies in a run's folder, and a run is never written to",
+                place=str(path),
+                remedy="Name a file somewhere else",
+            )
 
 
 def write_run(folder: Path, run: Run) -> None:

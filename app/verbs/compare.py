@@ -12,6 +12,7 @@ import numpy as np
 from app import answer
 from app.analysis import load_refitter, model_options
 from app.compare_charts import write_charts
+from app.run_files import outside_runs
 from calib.discover.compare_report import compare_report
 from calib.discover.run_compare import compare_fit
 from calib.discover.run_discovery import SEED
@@ -51,6 +52,8 @@ def command(
     off. Nothing is written but the figures asked for with --out and the effect files asked for
     with --propose, which --add takes.
     """
+    outside_runs(out, runs)
+    outside_runs(propose, runs)
     refit, begin = load_refitter(runs, add, model)
     fitted = refit.fit(begin)
     found = compare_fit(fitted, np.random.default_rng(SEED))

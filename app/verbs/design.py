@@ -12,6 +12,7 @@ import numpy as np
 from app import answer
 from app.analysis import load_refitter, model_options
 from app.pose_files import render_pose_file
+from app.run_files import outside_runs
 from calib.discover.run_design import CANDIDATES, Plan, design_follow_up
 from calib.effects import effect_named
 from calib.errors import BadInput
@@ -57,6 +58,7 @@ def command(
     first, second = discriminate
     if first == second:
         raise BadInput(f"{first} is named twice", remedy="Name two effects, or 'nothing'")
+    outside_runs(out, runs)
     refit, begin = load_refitter(runs, add, model)
     machine = refit.rows.machine
     effects = [effect_named(name, machine) for name in discriminate if name != NOTHING]

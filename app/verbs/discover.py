@@ -11,6 +11,7 @@ import click
 from app import answer
 from app.analysis import load_refitter, model_options
 from app.model_files import write_model
+from app.run_files import outside_runs
 from app.verbs.diagnose import bad_lines, sizes, um
 from calib.discover.run_discovery import discover_run, stage_of
 from calib.discover.run_report import discovery_report
@@ -34,6 +35,7 @@ def command(
 
     An effect is accepted only if poses that the fit has not seen are predicted no worse with it.
     """
+    outside_runs(save, runs)
     refit, begin = load_refitter(runs, add, model)
     with answer.working("looking for effects, adding the best, fitting again"):
         found = discover_run(refit, begin)

@@ -11,6 +11,8 @@ import click
 from app import answer
 from app.analysis import load_rows, model_options
 from app.model_files import write_model
+from app.run_files import outside_runs
+from calib.discover.run_agreement import runs_at_odds
 from calib.discover.run_diagnosis import fit_effects
 from calib.identify import fit_report
 
@@ -34,9 +36,11 @@ def command(
     Several runs are fitted together: geometry and machine effects are shared, each run has its own
     place of the tracker. Nothing is written but the file named with --save.
     """
+    outside_runs(save, runs)
     rows, effects = load_rows(runs, add, model)
     found = fit_effects(rows, effects)
-    report = fit_report(found)
+    odds = runs_at_odds(found)
+    report = {**fit_report(found), "remarks": [f"{odds}."] if odds else []}
     if save is not None:
         write_model(save, found)
         answer.say(f"model written to {save}")
@@ -62,6 +66,8 @@ def words(report: dict[str, Any]) -> str:
             [_row(entry) for entry in report["parameters"]],
         ),
     ]
+    if report["remarks"]:
+        lines += ["", *report["remarks"]]
     if report["unidentified_words"]:
         lines += ["", *report["unidentified_words"]]
     if report["bad_readings"]:

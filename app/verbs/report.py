@@ -7,6 +7,7 @@ import click
 from app import answer
 from app.analysis import model_options
 from app.report.build import write_report
+from app.run_files import outside_runs
 
 
 @click.command()
@@ -34,5 +35,6 @@ def command(
     as_json: bool,
 ) -> None:
     """Fit RUN... once more and write what was found as one self-contained HTML page."""
+    outside_runs(out, runs)
     write_report(runs, add=add, model=model, before=before, after=after, title=title, out=out)
     answer.show({"format": "pkm-report/1", "file": str(out)}, as_json, f"report in {out}")

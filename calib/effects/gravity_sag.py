@@ -62,7 +62,9 @@ class GravitySag(Effect):
         """Without [load] there is no weight to speak of."""
         if any(run.header.load is None for run in rows.runs):
             return "run.toml has no [load]"
-        masses = rows.channels.get("payload_kg", np.zeros(1))
+        masses = rows.channels.get("payload_kg", np.zeros(rows.count))
+        if not np.isfinite(masses[rows.on_platform]).any():
+            return "the column payload_kg is empty"
         weight = max(r.header.load.platform_mass_kg for r in rows.runs if r.header.load is not None)
         if weight == 0.0 and not np.nan_to_num(masses).any():
             return "neither platform nor payload has a mass"

@@ -16,6 +16,10 @@ class NestOffset(Effect):
     kind = "measurement"
     says = "an SMR nest is not where the drawing says"
 
+    def unavailable(self, rows: Rows) -> str:
+        """Some nest of the platform must have been read."""
+        return "" if rows.on_platform.any() else "no nest of the platform has been read"
+
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``nest-offset.4.x`` ..., mm, platform frame."""
         return tuple(

@@ -10,6 +10,8 @@ from calib.arrays import Array, BoolArray
 from calib.frames import align
 
 TRIPLES = 400
+LEAST_MOVED = 6
+"""Readings that must fit one another before they are said to have moved as one."""
 
 
 def misfit(base: Array, tracker: Array, rotation: Array, position: Array) -> Array:
@@ -62,3 +64,16 @@ def robust_align(base: Array, tracker: Array, slack: Array) -> tuple[Array, Arra
             break
         best = again
     return rotation, position, best
+
+
+def moved_together(base: Array, tracker: Array, slack: Array) -> BoolArray:
+    """Readings (N,) outside that fit one another: not strays, the tracker or the base was moved.
+
+    Shapes as in :func:`robust_align`; none is marked where fewer than six fit, or less than half.
+    """
+    count = base.shape[1]
+    if count < LEAST_MOVED or collinear(base):
+        return np.zeros(count, dtype=bool)
+    _, _, inside = robust_align(base, tracker, slack)
+    enough = inside.sum() >= max(LEAST_MOVED, 0.5 * count)
+    return inside if enough else np.zeros(count, dtype=bool)

@@ -1,0 +1,78 @@
+"""What the whole of the readings says beside any effect: runs at odds, uncertainties untrue.
+
+Both are said in words. A fit of several runs shares the geometry; where each run alone is
+explained and all together are not, the runs are of two machines, or of one that was changed.
+"""
+
+import math
+from dataclasses import dataclass
+
+from scipy import stats
+
+from calib.discover.run_diagnosis import fit_effects
+from calib.errors import BadInput
+from calib.identify.fitting import Fit
+from calib.runs.stack import stack
+
+BY_CHANCE = 1e-6
+"""Probability of what is called no chance."""
+TOGETHER_WORSE = 1.5
+"""Chi-square per degree of freedom together, over that apart, from which runs are at odds."""
+TOO_SMALL, TOO_LARGE = 1.3, 0.7
+"""Scatter in stated uncertainties beyond which these are called untrue."""
+
+
+@dataclass(frozen=True)
+class AtOdds:
+    """Runs that disagree: RMS apart and together, mm."""
+
+    apart_mm: float
+    together_mm: float
+
+    def __str__(self) -> str:
+        return (
+            f"The runs do not agree: each alone is explained to {1000 * self.apart_mm:.3g} um, "
+            f"together only to {1000 * self.together_mm:.3g} um. They are of two machines, or the "
+            "machine was changed between them: fit them apart"
+        )
+
+
+def runs_at_odds(fitted: Fit) -> AtOdds | None:
+    """Tell whether several runs agree on one geometry (F test of sharing it).
+
+    Parameters
+    ----------
+    fitted : Fit
+        Of all runs together; its effects are fitted to each run alone too.
+    """
+    rows = fitted.model.rows
+    if len(rows.runs) < 2 or not fitted.chi2_per_dof > TOGETHER_WORSE:
+        return None
+    apart = []
+    for run in rows.runs:
+        try:
+            apart.append(fit_effects(stack(rows.machine, [run]), fitted.model.effects))
+        except BadInput:  # a run that cannot stand alone says nothing about the others
+            return None
+    chi2, dof = sum(one.chi2 for one in apart), sum(one.dof for one in apart)
+    readings = sum(one.readings for one in apart)
+    shared = sum(one.trace_hat for one in apart) - fitted.trace_hat
+    if dof <= 0 or shared <= 0 or fitted.chi2_per_dof < TOGETHER_WORSE * chi2 / dof:
+        return None
+    ratio = (fitted.chi2 - chi2) / shared / (chi2 / dof)
+    if stats.f.sf(ratio, shared, dof) > BY_CHANCE:
+        return None
+    total = sum(one.readings * one.rms_mm**2 for one in apart)
+    return AtOdds(math.sqrt(total / readings), fitted.rms_mm)
+
+
+def untrue_uncertainties(fitted: Fit) -> str:
+    """Say if the readings scatter much more or much less than sx, sy, sz say; else empty."""
+    if not fitted.dof > 0:
+        return ""
+    scatter = math.sqrt(fitted.chi2_per_dof)
+    if scatter > TOO_SMALL and stats.chi2.sf(fitted.chi2, fitted.dof) < BY_CHANCE:
+        return f"The readings scatter {scatter:.2g} times as much as sx, sy, sz say"
+    if scatter < TOO_LARGE and stats.chi2.cdf(fitted.chi2, fitted.dof) < BY_CHANCE:
+        return f"The readings scatter only {scatter:.2g} times as much as sx, sy, sz say"
+    return ""
