@@ -68,6 +68,8 @@ def move_write_store(device) -> None:
         device.SPA("1", L0, 410.5)
     assert under_power.value.val in (60, 95)
     device.SVO(dict.fromkeys("ABC", 0))
+    assert device.qSRG("A", 1)["A"][1] in (0, "0x0")
+    assert {"0x7F010001", "0x7F030003"} <= {x.split("=")[0] for x in device.qHPA().splitlines()}
     device.CCL(1, "advanced")
     device.SPA("1", L0, 410.123456789)
     assert device.qSPA("1", L0)["1"][L0] == 410.123456789
