@@ -14,12 +14,13 @@ import tomli_w
 
 from app.run_files import read_text
 from calib.arrays import Array
-from calib.effects import Effect, Signature, Situation, Unknown, effect_named
+from calib.effects import Effect, Signature, Situation, Unknown, effect_named, is_shipped
 from calib.effects.operator import effect_from_text
 from calib.errors import BadInput
 from calib.identify import Fit, fit_report
 from calib.mechanism.description import Machine
 from calib.runs.stack import Rows
+from calib.toml_place import line_of
 
 FORMAT = "pkm-model/1"
 
@@ -149,7 +150,14 @@ class OwnEffect(Effect):
 def read_own_effect(path: Path) -> OwnEffect:
     """Read an operator's effect file; raises BadInput with file, line and column of a fault."""
     text = read_text(path)
-    return OwnEffect(effect_from_text(text, str(path)), text)
+    effect = effect_from_text(text, str(path))
+    if is_shipped(effect.id):
+        raise BadInput(
+            f"the id {effect.id!r} is that of an effect of the program",
+            place=f"{path}, line {line_of(text, 'effect', 'id')}, id",
+            remedy="Give the effect an id of its own",
+        )
+    return OwnEffect(effect, text)
 
 
 def chosen_effects(

@@ -158,8 +158,9 @@ def fit_effects(
     done = len(begun.model.effects) if begun is not None else 0
     latest = begun
     for count in range(done, len(effects)):
-        nonlinear = any(unknown.nonlinear for unknown in effects[count].unknowns(rows))
-        if not nonlinear:
+        if effects[count].unavailable(rows):
+            continue  # the model refuses it in words
+        if not any(unknown.nonlinear for unknown in effects[count].unknowns(rows)):
             continue
         latest = _fitted(rows, effects[:count], masked, latest)
         (one,) = effect_columns(latest, [effects[count]])

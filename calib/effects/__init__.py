@@ -8,7 +8,7 @@ from calib.effects.component import Effect, Signature, Situation, Unknown
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 
-__all__ = ["Effect", "Signature", "Situation", "Unknown", "catalogue", "effect_named"]
+__all__ = ["Effect", "Signature", "Situation", "Unknown", "catalogue", "effect_named", "is_shipped"]
 
 
 @lru_cache(maxsize=1)
@@ -24,15 +24,19 @@ def catalogue(machine: Machine) -> tuple[Effect, ...]:
     return tuple(sorted((e for e in _shipped() if e.applies(machine)), key=lambda e: e.id))
 
 
+def is_shipped(identifier: str) -> bool:
+    """Tell whether an identifier is that of a shipped effect, on whatever machine."""
+    return any(effect.id == identifier for effect in _shipped())
+
+
 def effect_named(identifier: str, machine: Machine) -> Effect:
     """Find an effect; raises BadInput for one that the machine does not have."""
     here = {effect.id: effect for effect in catalogue(machine)}
     if identifier in here:
         return here[identifier]
-    elsewhere = any(effect.id == identifier for effect in _shipped())
     raise BadInput(
         f"the effect {identifier!r} is not defined for the machine {machine.name}"
-        if elsewhere
+        if is_shipped(identifier)
         else f"unknown effect {identifier!r}",
         remedy=f"Known for {machine.name}: {', '.join(here)}",
     )
