@@ -21,7 +21,7 @@ class PlanOptions:
     """
 
     order: Order = "nest-by-nest"
-    reference_every: int = 30
+    reference_every: int = 10
     cycles: int = 1
     warm_up: bool = True
     two_face: bool = True

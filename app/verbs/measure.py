@@ -47,7 +47,7 @@ def outcome_json(outcome: Outcome) -> dict[str, Any]:
 )
 @click.option(
     "--reference-every",
-    default=30,
+    default=10,
     show_default=True,
     type=click.IntRange(1),
     help="Poses between two looks at the base nests.",
