@@ -63,7 +63,7 @@ def close(
         If it does not close.
     """
     now, step = start, np.zeros(())
-    for _ in range(MOST_STEPS):
+    for taken in range(MOST_STEPS):
         turned = motors(now.pose, now.by_motor)
         step, by_motor = _step(g, grown, stiffness, now, turned)
         large = np.max(np.abs(step[:, 3:]), axis=1, keepdims=True)
@@ -73,7 +73,8 @@ def close(
             rotation_from_vector(step[:, 3:6]) @ now.pose.rotation,
         )
         now = Stance(pose, now.idle + step[:, 10:], now.top + step[:, 6:10], by_motor)
-        if float(np.max(np.abs(step / SCALE), initial=0.0)) < CLOSED:
+        # The first step tells how the motors move the platform: they have not yielded before.
+        if taken and float(np.max(np.abs(step / SCALE), initial=0.0)) < CLOSED:
             return now
     raise ArithmeticError(f"the limbs do not close: {np.max(np.abs(step)):.3g} is left")
 

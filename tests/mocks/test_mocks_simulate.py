@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 
 from app.cli import run
+from app.machine_files import load_machine
+from calib.discover.run_diagnosis import fit_effects
 from calib.runs import parse_run
+from calib.runs.stack import stack
 from mocks.clock import ManualClock
 from mocks.physics.hexapod_body import AROUND
 from mocks.physics.hidden import Hidden
@@ -96,6 +99,42 @@ def test_simulated_and_live_machine_are_the_same(hidden: dict[str, float]) -> No
             assert made.xyz[row] == pytest.approx(seen, abs=2e-6)
 
 
+ON_MACHINES: list[tuple[str, dict[str, float]]] = [
+    ("tripod", {}),
+    ("tripod", {"backlash.limb1": 0.02, "parallelogram-sides.limb2": 0.05, "gravity-sag.c": 1e-4}),
+    ("ptm", {"backlash.limb2": 1e-4, "gravity-sag.c": 1e-8, "screw-cyclic.limb1.cos": 1e-4}),
+    ("ptm", {"redundancy.limb": 3.0, "screw-pitch.limb2": 1e-3, "unknown.hysteresis.limb1": 1e-4}),
+]
+
+
+@pytest.mark.parametrize(("machine", "hidden"), ON_MACHINES)
+def test_simulated_and_live_machines_are_the_same(machine: str, hidden: dict[str, float]) -> None:
+    effects = Hidden(hidden)
+    made = simulate(RunPlan(machine=machine, seed=7, poses=6, noise_mm=1e-9, hidden=effects))
+    clock = ManualClock()
+    live = World(clock, WorldPlan(machine=machine, seed=7, hidden=effects, smrs=3))
+    reference = live.body.reference(live.parameters)
+    for row, nest in enumerate(made.layout.nest):
+        for leg, extension in zip(live.legs, made.q[row] - reference, strict=True):
+            leg.command(extension, 1.0)
+        clock.advance(200.0)
+        if nest in live.around.platform_nests:
+            now = np.array([clock.now()])
+            seen = live.distortions.seen(live.nest_in_tracker(nest, now), now)[0]
+            assert made.xyz[row] == pytest.approx(seen, abs=2e-6)
+
+
+@pytest.mark.parametrize("machine", ["hexapod", "tripod", "ptm"])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_runs_of_every_machine_are_fitted_to_their_noise(machine: str, seed: int) -> None:
+    made = simulate(RunPlan(machine=machine, seed=seed, poses=50, prior="normal"))
+    described = load_machine(machine)
+    parsed = parse_run(run_toml(made), points_csv(made), actuators=len(described.actuators))
+    fit = fit_effects(stack(described, [parsed]), [])
+    assert fit.bad == ()
+    assert fit.chi2_per_dof == pytest.approx(1.0, abs=0.2)
+
+
 def test_tracker_noise_is_as_its_covariance_says() -> None:
     clean = simulate(RunPlan(seed=8, poses=150, noise_mm=1e-9))
     noisy = simulate(RunPlan(seed=8, poses=150, noise_mm=None))
@@ -152,3 +191,14 @@ def test_command_line_says_what_is_wrong(
     assert run(["simulate", "hexapod", "--out", str(tmp_path / "run"), *wrong]) == 2
     assert says in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
+
+
+def test_command_line_writes_over_no_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    call = ["simulate", "hexapod", "--out", str(tmp_path / "run"), "--poses", "2"]
+    assert run([*call, "--seed", "1"]) == 0
+    before = (tmp_path / "run" / "points.csv").read_bytes()
+    assert run([*call, "--seed", "2"]) == 2
+    assert "a run already" in capsys.readouterr().err
+    assert (tmp_path / "run" / "points.csv").read_bytes() == before
