@@ -8,6 +8,7 @@ import numpy as np
 
 from app import answer
 from app.pose_files import read_any_poses
+from app.run_files import HEADER, POINTS
 from calib.errors import BadInput
 from calib.mechanism.rigid import Poses
 from calib.mechanism.task import task_values
@@ -61,6 +62,13 @@ def command(machine: str, out: Path, truth: Path | None, as_json: bool, **option
     """
     if truth is not None and truth.parent.resolve() == out.resolve() and truth.name != "truth.json":
         raise BadInput(f"{truth} lies in the run's folder", remedy="Put the truth elsewhere")
+    for path in (out / HEADER, out / POINTS):
+        if path.exists():
+            raise BadInput(
+                "there is a run already, and a run is never written to",
+                place=str(path),
+                remedy="Choose another folder",
+            )
     try:
         run = simulate(_plan(machine, **options))
     except (ValueError, ArithmeticError) as wrong:
