@@ -7,4 +7,4 @@ def run(site: Path | None = None, *, root: Path = Path("sessions")) -> None:
     """Open the screens, with a site file if one is named; sessions get folders under ``root``."""
     from app.tui.program import Workbench
 
-    Workbench(site, root=root).run()
+    Workbench(site, root=root, ends_on_signals=True).run()

@@ -148,6 +148,10 @@ class Desk:
         if self.connected or self._connecting:
             return
         station = self._need_station()
+        if self.mock is not None and self.mock.returncode is not None:
+            raise ConnectFailed(
+                "the mock station that was started here has ended", remedy="Start another one (m)"
+            )
         self._connecting = True
         try:
             await station.connect()
@@ -172,10 +176,12 @@ class Desk:
         states = await self.station.poll()
         if states.controller is None and states.tracker is None and not self.busy:
             await self.station.close()
+            fault = self.picture.trouble if self.picture.run == "fault" else None
             self.picture.say_trouble(
                 "Neither controller nor tracker answers",
                 "Look at power and network, then connect again (c on the Devices screen)",
             )
+            self.picture.trouble = fault or self.picture.trouble
 
     async def clear_faults(self) -> None:
         """Reset standing faults of the drives; they stay without power."""

@@ -1,7 +1,7 @@
 """Discover: which physical effect is missing; add it and watch the error fall."""
 
 import math
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
@@ -12,7 +12,6 @@ from textual.widgets import DataTable, Static
 
 from app.tui.choosing import ask_for_model_file, choose_runs
 from app.tui.dialogs import Pick
-from app.tui.discovering import Search, Stair, View
 from app.tui.face import Face
 from app.tui.picture import Picture
 from app.tui.widgets.plots import BinPlot
@@ -20,6 +19,9 @@ from app.tui.wording import p_text
 
 STAIRS = 4
 """How many of the last steps are shown."""
+
+if TYPE_CHECKING:
+    from app.tui.discovering import Search, Stair, View
 
 
 class DiscoverFace(Face):
@@ -89,7 +91,7 @@ class DiscoverFace(Face):
             if structure:
                 self.query_one(BinPlot).show(structure[self._shown % len(structure)])
 
-    def _fill(self, view: View | None) -> None:
+    def _fill(self, view: "View | None") -> None:
         table = self.query_one("#candidates", DataTable)
         table.clear(columns=True)
         names = ("p", "RMS", "held out", "visible")
@@ -158,7 +160,7 @@ class DiscoverFace(Face):
         self.draw()
 
 
-def stairs_text(search: Search | None, room: int) -> Content:
+def stairs_text(search: "Search | None", room: int) -> Content:
     """The error after each step; a bar of ``room`` signs: noise, and what is left to explain."""
     if search is None:
         return Content.from_markup(
@@ -178,7 +180,7 @@ def stairs_text(search: Search | None, room: int) -> Content:
     return Content("\n").join(lines)
 
 
-def bar(stair: Stair, top: float, room: int) -> Content:
+def bar(stair: "Stair", top: float, room: int) -> Content:
     """A bar as long as the RMS: the part that a perfect model would leave, and the rest."""
     noise = round(room * min(stair.floor_um, stair.rms_um) / top)
     rest = max(0, round(room * stair.rms_um / top) - noise)
@@ -193,7 +195,7 @@ def _cut(text: str, room: int) -> str:
     return text if len(text) <= room else text[: room - 1] + "…"
 
 
-def fails_text(view: View | None, shown: int, wide: bool) -> Content:
+def fails_text(view: "View | None", shown: int, wide: bool) -> Content:
     """What the residual depends on, the strongest first; ``shown`` is the one in the picture."""
     if view is None:
         return Content("")
@@ -216,7 +218,7 @@ def fails_text(view: View | None, shown: int, wide: bool) -> Content:
     return Content("\n").join(lines)
 
 
-def advice_text(view: View | None) -> Content:
+def advice_text(view: "View | None") -> Content:
     """The answer in one sentence, and what cannot be told apart."""
     if view is None:
         return Content("")
@@ -228,7 +230,7 @@ def advice_text(view: View | None) -> Content:
     return text
 
 
-def found_text(view: View | None) -> Content:
+def found_text(view: "View | None") -> Content:
     """Effects in the model with their sizes."""
     if view is None or not view.effects:
         return Content.from_markup("[dim]geometry only[/]")

@@ -1,7 +1,7 @@
 """Fit: identify the parameters from a run, see what they are worth and what stays open."""
 
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from rich.text import Text
@@ -11,11 +11,13 @@ from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.content import Content
 from textual.widgets import DataTable, Static
 
-from app.tui.analysis import FitAnswer
 from app.tui.choosing import ask_for_model_file, choose_runs
 from app.tui.face import Face
 from app.tui.picture import Picture
 from app.tui.widgets.plots import PairPlot
+
+if TYPE_CHECKING:
+    from app.tui.analysis import FitAnswer
 
 
 class FitFace(Face):
@@ -82,7 +84,7 @@ class FitFace(Face):
         if self._drawn is not None:
             self._fill(self._drawn)
 
-    def _fill(self, answer: FitAnswer) -> None:
+    def _fill(self, answer: "FitAnswer") -> None:
         table = self.query_one("#fit-table", DataTable)
         table.clear(columns=True)
         value = ("value",) if self.wide else ()
@@ -108,7 +110,7 @@ class FitFace(Face):
         ask_for_model_file(self)
 
 
-def summary(answer: FitAnswer | None, runs: tuple[str, ...]) -> Content:
+def summary(answer: "FitAnswer | None", runs: tuple[str, ...]) -> Content:
     """Before and after, in a few lines that keep their places."""
     if answer is None:
         which = f"Run: {_short(runs)}\n" if runs else ""
@@ -148,7 +150,7 @@ def verdict(report: dict[str, Any]) -> str:
     return "✓ good" if chi2 > 0.75 else "! too little"
 
 
-def words(answer: FitAnswer | None) -> Content:
+def words(answer: "FitAnswer | None") -> Content:
     """What is not determined, which readings are excluded, what else to know."""
     if answer is None:
         return Content("")

@@ -57,7 +57,8 @@ class MeasureFace(Face):
         steps.show(picture.steps, picture.current)
         done = sum(step.state in ("done", "skipped") for step in picture.steps)
         steps.border_subtitle = f"{done} of {len(picture.steps)}" if picture.steps else ""
-        self.query_one("#now", Static).update(now_text(picture, self.wide))
+        turning = self.desk.site is not None and self.desk.site.machine.actuators[0].unit == "rad"
+        self.query_one("#now", Static).update(now_text(picture, self.wide, turning))
         base = self.desk.site.base_nests if self.desk.site else ()
         self.query_one(MissPlot).show(picture.points, base)
         scatter = picture.scatter
@@ -118,8 +119,11 @@ class MeasureFace(Face):
         self.app.push_screen(Pick("Go on with", "Sessions, newest first", options), picked)
 
 
-def now_text(picture: Picture, wide: bool) -> Content:
-    """Six lines that keep their places: step, pose, legs, scatter, reading, base and drift."""
+def now_text(picture: Picture, wide: bool, turning: bool) -> Content:
+    """Six lines that keep their places: step, pose, q, scatter, reading, base and drift.
+
+    ``turning``: the actuators turn; they are shown in degrees.
+    """
     if not picture.steps:
         return Content.from_markup(
             "No job.  [bold $accent]n[/] starts a new run,\n"
@@ -128,7 +132,7 @@ def now_text(picture: Picture, wide: bool) -> Content:
     rows = [
         ("step", _step(picture)),
         ("pose", _pose(picture, wide)),
-        ("legs", _legs(picture, wide)),
+        ("q", _actuators(picture, wide, turning)),
         ("noise", _scatter(picture)),
         ("read", _reading(picture)),
         ("base", _base(picture)),
@@ -154,13 +158,16 @@ def _pose(picture: Picture, wide: bool) -> Content:
     return Content(f"{x:.1f} {y:.1f} {z:.1f} mm {' '.join(turns)}°")
 
 
-def _legs(picture: Picture, wide: bool) -> Content:
+def _actuators(picture: Picture, wide: bool, turning: bool) -> Content:
     live = picture.live
     q = live.q if live is not None else picture.pose.q if picture.pose is not None else None
     if q is None:
         return Content("-")
     sign = "▶" if live is not None and live.moving else " "
-    return Content(sign + ("  " if wide else " ").join(f"{x:.{3 if wide else 1}f}" for x in q))
+    shown = [math.degrees(x) for x in q] if turning else q
+    digits = (3 if wide else 1) + turning
+    text = ("  " if wide else " ").join(f"{x:.{digits}f}" for x in shown)
+    return Content(f"{sign}{text}{'°' if turning else ''}")
 
 
 def _scatter(picture: Picture) -> Content:

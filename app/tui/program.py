@@ -1,7 +1,11 @@
 """The terminal program: screens, the keys that work everywhere, and who puts errors up."""
 
+import asyncio
+import signal
 from collections.abc import Awaitable, Callable, Iterable
+from importlib import import_module
 from pathlib import Path
+from types import FrameType
 from typing import Any, ClassVar
 
 from textual.app import App, SystemCommand
@@ -59,11 +63,18 @@ class Workbench(App[None]):
         Binding("ctrl+q", "quit", "Quit", tooltip="Leave; asks if a job runs"),
     ]  # fmt: skip
 
-    def __init__(self, site: Path | None = None, *, root: Path = Path("sessions")) -> None:
+    def __init__(
+        self,
+        site: Path | None = None,
+        *,
+        root: Path = Path("sessions"),
+        ends_on_signals: bool = False,
+    ) -> None:
         super().__init__()
         self.desk = Desk(root)
         self.tabs = tuple((face.mode, face.label) for face in FACES)
         self._site = site
+        self._ends_on_signals = ends_on_signals
         self._asked = ""
 
     def on_mount(self) -> None:
@@ -72,19 +83,39 @@ class Workbench(App[None]):
         self.theme = BENCH.name
         self.set_interval(0.1, self._watch_prompt)
         self.run_worker(self._watch_devices(), group="poll", exit_on_error=True)
+        self.run_worker(self._warm_up(), group="warm-up", exit_on_error=True)
+        if self._ends_on_signals:
+            self._end_on_signals()
         if self._site is not None:
             site = self._site
             self.act(lambda: self.desk.open_site(site))
 
-    async def _watch_devices(self) -> None:
-        from asyncio import sleep
+    def _end_on_signals(self) -> None:
+        """Stop the machine when the terminal is closed or the process is asked to end."""
+        loop = asyncio.get_running_loop()
 
+        def leave(number: int, frame: FrameType | None) -> None:
+            loop.call_soon_threadsafe(lambda: self.run_worker(self._close(), exit_on_error=True))
+
+        for name in ("SIGTERM", "SIGHUP"):
+            if hasattr(signal, name):  # no SIGHUP on Windows
+                signal.signal(getattr(signal, name), leave)
+
+    async def _close(self) -> None:
+        await self.desk.close()
+        self.exit()
+
+    async def _warm_up(self) -> None:
+        """Import what the analysis needs while the operator looks at the first screen."""
+        await asyncio.to_thread(import_module, "app.tui.discovering")
+
+    async def _watch_devices(self) -> None:
         while True:
             try:
                 await self.desk.poll()
             except FORESEEN as error:
                 self.put_up(error)
-            await sleep(POLL_S)
+            await asyncio.sleep(POLL_S)
 
     # actions and their errors
 
@@ -160,14 +191,12 @@ class Workbench(App[None]):
     async def action_quit(self) -> None:
         """Leave; a running job is asked for first."""
         if not self.desk.busy:
-            await self.desk.close()
-            self.exit()
+            await self._close()
             return
 
         async def leave(answer: str | None) -> None:
             if answer == "stop and leave":
-                await self.desk.close()
-                self.exit()
+                await self._close()
 
         text = (
             "A job is running. Leaving stops the machine and ends the job; nothing measured is "

@@ -1,17 +1,21 @@
-"""The study of what was measured: which runs, which effects, the fit, the discovery."""
+"""The study of what was measured: which runs, which effects, the fit, the discovery.
+
+What needs the statistics of scipy is imported when it is used: the screens open without it.
+"""
 
 import asyncio
 from collections.abc import Callable
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 from app.errors import GateRefused
-from app.model_files import write_model
-from app.tui.analysis import FitAnswer, answer_of, identify
-from app.tui.discovering import Search
 from app.tui.picture import Picture
 from app.tui.shelf import runs_under
 from calib.errors import BadInput
+
+if TYPE_CHECKING:
+    from app.tui.analysis import FitAnswer
+    from app.tui.discovering import Search
 
 _Answer = TypeVar("_Answer")
 
@@ -58,9 +62,15 @@ class Study:
         """Fit the chosen runs, or the latest; raises :class:`BadInput`."""
         runs = self._chosen()
         effects = self.effects
-        self._take(await self._think(lambda: identify(runs, effects)))
 
-    def _take(self, answer: FitAnswer) -> None:
+        def work() -> "FitAnswer":
+            from app.tui.analysis import identify
+
+            return identify(runs, effects)
+
+        self._take(await self._think(work))
+
+    def _take(self, answer: "FitAnswer") -> None:
         self.answer = answer
         report = answer.report
         self._picture.write(
@@ -73,7 +83,13 @@ class Study:
         """Ask what the model of the chosen runs misses, with the effects that are in it."""
         runs = self._chosen()
         effects = self.effects
-        self.search = await self._think(lambda: Search.of(runs, effects))
+
+        def work() -> "Search":
+            from app.tui.discovering import Search
+
+            return Search.of(runs, effects)
+
+        self.search = await self._think(work)
         self._tell_stair(self.search)
 
     async def change(self, what: Literal["add", "remove", "go on"], name: str = "") -> None:
@@ -82,7 +98,9 @@ class Study:
         if search is None:
             raise BadInput("nothing is diagnosed yet", remedy="Diagnose first (d)")
 
-        def work() -> FitAnswer:
+        def work() -> "FitAnswer":
+            from app.tui.analysis import answer_of
+
             if what == "add":
                 search.add(name)
             elif what == "remove":
@@ -95,7 +113,7 @@ class Study:
         self.effects = search.present.effects
         self._tell_stair(search)
 
-    def _tell_stair(self, search: Search) -> None:
+    def _tell_stair(self, search: "Search") -> None:
         stair = search.stairs[-1]
         self._picture.write(
             f"{stair.did}: RMS {stair.rms_um:.2f} um, floor {stair.floor_um:.2f}", "good"
@@ -105,5 +123,7 @@ class Study:
         """Write the fitted model to a file."""
         if self.answer is None:
             raise BadInput("nothing is fitted yet", remedy="Fit a run first")
+        from app.model_files import write_model
+
         write_model(path, self.answer.fit)
         self._picture.write(f"model written to {path}", "good")

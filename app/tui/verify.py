@@ -20,7 +20,7 @@ from app.tui.widgets.plots import PairPlot
 from app.verification import PAPER
 from calib.pose_error import Summary
 
-ALL, QUICK = "all 216 poses", "quick: 27 poses"
+ALL, QUICK = "all poses", "quick: one in eight"
 
 
 class VerifyFace(Face):

@@ -54,7 +54,7 @@ def state_text(picture: Picture, connected: bool) -> str:
         text += f" {progress.done}/{progress.total}"
         if progress.remaining_s is not None:
             text += f" · {duration(progress.remaining_s)} left"
-    return text
+    return text if connected or picture.busy else f"{text} · not connected"
 
 
 def duration(seconds: float) -> str:
