@@ -2,12 +2,12 @@
 
 from drivers.errors import DeviceError, DeviceFault, DriveFault, Refused
 
-STOPPED, UNKNOWN_PARAMETER, MOTION_ERROR = 10, 54, 1024
+NOT_ENABLED, STOPPED, UNKNOWN_PARAMETER, MOTION_ERROR = 5, 10, 54, 1024
 
 WORDS = {
     1: ("syntax error", "Check that this controller speaks GCS 2.0."),
     2: ("unknown command", "Check that this is the controller of the site file."),
-    5: (
+    NOT_ENABLED: (
         "an axis is not enabled or does not know its reference",
         "Enable the machine; home the actuators that lost their reference.",
     ),

@@ -8,11 +8,12 @@ from collections.abc import Mapping
 from drivers.errors import DeviceFault, LinkError, Refused, Silence
 from drivers.gcs.answers import numbers
 from drivers.gcs.axes import MOVING, ON_TARGET, REFERENCING, SERVO, Axes
-from drivers.gcs.line import Line
+from drivers.gcs.errors import NOT_ENABLED
+from drivers.gcs.line import ANSWER_S, Line
 from drivers.gcs.link import GcsLink
 from drivers.gcs.watch import Watch
 
-REST_S, POLL_S = 2.0, 0.005
+REST_S, STOP_S, POLL_S = 1.5, 2.5, 0.005
 # What a solver may leave of an angle that is meant to be 0.
 LEVEL_RAD = 1e-6
 
@@ -61,7 +62,17 @@ class Motion:
             raise Refused(
                 "the machine was stopped", device=self._device, remedy="Enable the machine first."
             )
-        await self._link.call(lambda line: line.command(command, stops=stops))
+        try:
+            await self._link.call(lambda line: line.command(command, stops=stops))
+        except Refused as error:
+            if error.code == NOT_ENABLED:
+                await self._look_for_cause()
+            raise
+
+    async def _look_for_cause(self) -> None:
+        """Raise a servo's fault or a restart, if that is why the machine does not move."""
+        await self._link.call(lambda line: self._watch.look(line, ANSWER_S))
+        self._link.check()
 
     def _read_targets(self, line: Line) -> tuple[float, ...]:
         axes = self._axes
@@ -85,14 +96,14 @@ class Motion:
             bits = await self._watch.registers()
             self._link.check()
             if not all(word & SERVO for word in bits):
-                raise self._interrupted()
+                raise await self._interrupted()
             if all(word & ON_TARGET and not word & MOVING for word in bits):
                 break
             self._need_time(deadline, timeout)
             await asyncio.sleep(POLL_S)
         # A controller that was stopped is on target, too: where it stands.
         if await self._link.call(self._read_targets) != self.targets:
-            raise self._interrupted()
+            raise await self._interrupted()
 
     async def reference(self, axis: str, timeout: float) -> None:
         """Run a reference move; raises Refused, DriveFault, DeviceFault, Silence."""
@@ -112,7 +123,8 @@ class Motion:
                 remedy="Enable the machine and home it again.",
             )
 
-    def _interrupted(self) -> DeviceFault:
+    async def _interrupted(self) -> DeviceFault:
+        await self._look_for_cause()
         return DeviceFault(
             "the motion was stopped before it reached its target",
             device=self._device,
@@ -133,16 +145,23 @@ class Motion:
         """Send #24, wait for rest and send ``switch_off``; never raises for a second call."""
         again, self._stopped = self._stopped, True
         try:
-            await self._link.stop()
-            await self._rest()
-            await self._link.call(lambda line: line.command(switch_off))
+            async with asyncio.timeout(STOP_S):
+                await self._link.stop()
+                await self._rest()
+                await self._link.call(lambda line: line.command(switch_off))
+        except TimeoutError as error:
+            if not again:
+                raise self._unconfirmed(Silence, f"no answer within {STOP_S} s") from error
         except LinkError as error:
             if not again:
-                raise type(error)(
-                    f"the stop was not confirmed ({error.what})",
-                    device=error.device,
-                    remedy="Use the emergency stop. The controller stops by itself without the PC.",
-                ) from error
+                raise self._unconfirmed(type(error), error.what) from error
+
+    def _unconfirmed(self, kind: type[LinkError], why: str) -> LinkError:
+        return kind(
+            f"the stop was not confirmed ({why})",
+            device=self._device,
+            remedy="Use the emergency stop. The controller stops by itself without the PC.",
+        )
 
     async def _rest(self) -> None:
         deadline = time.monotonic() + REST_S

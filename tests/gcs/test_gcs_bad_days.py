@@ -50,7 +50,7 @@ async def test_drive_fault_in_a_move_stops_all_sliders(bench: Bench, controller:
     bench.world.faults.inject("drive-fault:2")
     with pytest.raises(DriveFault, match=r"q2 \(axis B\)"):
         await controller.wait_arrived(5.0)
-    assert not bench.world.moving
+    await until(lambda: not bench.world.moving)
     await until(lambda: any(a.fault and "q2" in a.device for a in bench.alarms))
     with pytest.raises(DriveFault):
         await controller.move_to_pose(HOME)
@@ -73,6 +73,14 @@ async def test_drive_stays_in_fault_until_the_cause_is_gone(
         await controller.move_to_pose(HOME)
     await controller.enable()
     await go(controller, LOW)
+
+
+async def test_refused_move_says_why_the_servos_are_off(bench: Bench, controller: GcsController):
+    await controller.enable()
+    bench.world.faults.inject("drive-fault:2")
+    await until(lambda: bench.station.controller.sliders["B"].fault)
+    with pytest.raises(DriveFault, match="q2"):
+        await controller.move_to_pose(LOW)
 
 
 async def test_jammed_slider_becomes_a_following_error(bench: Bench, controller: GcsController):
