@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 
 from app.run_files import read_run
 from calib.identify import fit
-from calib.identify.fitting import begin as begin_fit
+from calib.identify.starting import begin as begin_fit
 from calib.model import Model
 from calib.runs.stack import Rows, stack
 

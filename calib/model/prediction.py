@@ -23,6 +23,17 @@ from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.rigid import cross, exponential, product, rotate
 from calib.mechanism.solve import Configuration, forward, home_configuration
+from calib.model.columns import (
+    apply,
+    apply_each,
+    at_trial,
+    change_of,
+    channels_known,
+    lever_of,
+    through,
+    whitened_columns,
+    whitened_frame,
+)
 from calib.runs.stack import Rows
 
 SETTLING_PASSES = 4
@@ -209,13 +220,13 @@ class Model:
         )
         now = replace(state, configuration=closed, situation=situation)
         signatures = self._signatures(now)
-        residual = rows.position - point - _change(signatures, "point", point)
-        combined = _combine(rows.whitener, turn)
-        lever = _lever(combined, arm, rows.on_platform)
-        parts = [_through(lever, situation.parameter_twists[self.free])]
+        residual = rows.position - point - change_of(signatures, "point", point)
+        combined = whitened_frame(rows.whitener, turn)
+        lever = lever_of(combined, arm, rows.on_platform)
+        parts = [through(lever, situation.parameter_twists[self.free])]
         parts += [whitened_columns(signature, situation) for _, signature in signatures]
         parts += self._frame_columns(turned)
-        return Linearised(now, residual, _apply(rows.whitener, residual), np.concatenate(parts))
+        return Linearised(now, residual, apply(rows.whitener, residual), np.concatenate(parts))
 
     def predict(self, state: State) -> Array:
         """What the tracker should read (3, N), mm, without derivatives."""
@@ -228,7 +239,7 @@ class Model:
         base = np.where(rows.on_platform, poses.position[:, inverse] + arm + bent, rows.nest)
         turned = rotate(state.frame_rotation[:, :, rows.run], base)
         point = turned + state.frame_position[:, rows.run]
-        return point + _change(self._signatures(state), "point", point)
+        return point + change_of(self._signatures(state), "point", point)
 
     def _settled(self, state: State) -> tuple[Configuration, Array, Array, Array]:
         """Close the machine where its effects and its pose agree; parameters, nests and twists too.
@@ -244,12 +255,12 @@ class Model:
         moved = np.full_like(rows.extension, np.inf)
         for _ in range(SETTLING_PASSES):
             signatures = self._signatures(state)
-            change = _change(signatures, "extension", rows.extension)
+            change = change_of(signatures, "extension", rows.extension)
             parameters: Array = state.parameters
             shaped = any(s.parameters is not None for _, s in signatures)
             if shaped:
                 held = np.repeat(state.parameters[:, None], rows.count, axis=1)
-                parameters = (held + _change(signatures, "parameters", held))[:, first]
+                parameters = (held + change_of(signatures, "parameters", held))[:, first]
             extension = (rows.extension + change)[:, first]
             closed = self._closed(extension, parameters, state.configuration, self._closing(state))
             if not shaped and np.max(np.abs(change - moved), initial=0.0) < SETTLED:
@@ -269,8 +280,8 @@ class Model:
                     parameters=parameters,
                 ),
             )
-        twist = _change(signatures, "twist", np.zeros((6, rows.count)))
-        return closed, parameters, rows.nest + _change(signatures, "nest", rows.nest), twist
+        twist = change_of(signatures, "twist", np.zeros((6, rows.count)))
+        return closed, parameters, rows.nest + change_of(signatures, "nest", rows.nest), twist
 
     def _closing(self, state: State) -> Machine:
         """The machine as the effects let it close."""
@@ -321,7 +332,7 @@ class Model:
         for axis in range(3):
             motions[axis, axis] = 1.0
             motions[3 + axis] = cross(np.eye(3)[axis][:, None], turned)
-        whitened = _apply_each(rows.whitener, motions)
+        whitened = apply_each(rows.whitener, motions)
         return [whitened * (rows.run == run) for run in range(self.frames)]
 
     def moved(self, state: State, step: Array) -> State:
@@ -363,95 +374,3 @@ def _of_these_states(start: Configuration, extension: Array, machine: Machine) -
     like = home_configuration(machine).strain
     shapes = [strain.shape[:2] for strain in start.strain] == [one.shape[:2] for one in like]
     return shapes and start.count == extension.shape[1]
-
-
-def at_trial(unknowns: Sequence[Unknown], trial: Sequence[float]) -> Array:
-    """Values (U,) of an effect that does nothing yet, its nonlinear unknowns at a trial."""
-    values = np.zeros(len(unknowns))
-    values[[index for index, unknown in enumerate(unknowns) if unknown.nonlinear]] = trial
-    return values
-
-
-def channels_known(effect: Effect, rows: Rows) -> BoolArray:
-    """Readings (N,) that have every channel that an effect needs (reference readings always)."""
-    known = np.ones(rows.count, dtype=bool)
-    for name in (*effect.channels, *effect.depends):
-        if name in rows.channels:
-            known &= np.isfinite(rows.channels[name])
-    return known | ~rows.on_platform if effect.kind == "machine" else known
-
-
-def whitened_columns(signature: Signature, situation: Situation) -> Array:
-    """Whitened derivative (U, 3, N) of the readings by an effect's unknowns."""
-    rows = situation.rows
-    whitener = rows.whitener
-    combined = _combine(whitener, situation.frame_rotation)
-    arm = situation.base_point - situation.position
-    total: Array | float = 0.0
-    lever = _lever(combined, arm, rows.on_platform)
-    if signature.extension is not None:
-        shape = np.nan_to_num(signature.extension)
-        total = total + _contract(shape, situation.actuator_columns)
-    if signature.parameters is not None:
-        twists = _contract(np.nan_to_num(signature.parameters), situation.parameter_twists)
-        total = total + _through(lever, twists)
-    if signature.twist is not None:
-        total = total + _through(lever, np.nan_to_num(signature.twist))
-    if signature.nest is not None:
-        turned = np.stack([rotate(situation.rotation, shape) for shape in signature.nest])
-        total = total + _apply_each(combined * rows.on_platform, turned)
-    if signature.point is not None:
-        total = total + _apply_each(whitener, np.nan_to_num(signature.point))
-    return np.asarray(total)
-
-
-def _contract(shape: Array, twists: Array) -> Array:
-    """Sum over the middle axis: (U, n, N) and (n, k, N) -> (U, k, N), skipping what is zero."""
-    out = np.zeros((shape.shape[0], *twists.shape[1:]))
-    for unknown, actuator in zip(*np.nonzero(np.any(shape, axis=2)), strict=True):
-        out[unknown] += shape[unknown, actuator] * twists[actuator]
-    return out
-
-
-def _change(signatures: list[tuple[Array, Signature]], what: str, like: Array) -> Array:
-    total = np.zeros_like(like)
-    for linear, signature in signatures:
-        shape = getattr(signature, what)
-        if shape is not None:
-            total += np.nan_to_num(np.tensordot(linear, shape, axes=1))
-    return total
-
-
-def _combine(whitener: Array, turn: Array) -> Array:
-    """Whitener times frame rotation, (3, 3, N)."""
-    return np.stack([_apply(whitener, turn[:, j]) for j in range(3)], axis=1)
-
-
-def _lever(combined: Array, arm: Array, on_platform: BoolArray) -> Array:
-    """Matrix (3, 6, N) from the platform's twist to the whitened reading; zero for base nests."""
-    lever = np.empty((3, 6, arm.shape[1]))
-    lever[:, :3] = combined
-    for axis in range(3):
-        lever[:, 3 + axis] = _apply(combined, cross(np.eye(3)[axis][:, None], arm))
-    lever *= on_platform
-    return lever
-
-
-def _through(lever: Array, twists: Array) -> Array:
-    """(3, 6, N) and (U, 6, N) -> (U, 3, N)."""
-    out = np.empty((twists.shape[0], 3, twists.shape[2]))
-    for row in range(3):
-        out[:, row] = np.einsum("kn,ukn->un", lever[row], twists)
-    return out
-
-
-def _apply(matrix: Array, vector: Array) -> Array:
-    """(3, 3, N) and (3, N) -> (3, N)."""
-    out: Array = np.einsum("ijn,jn->in", matrix, vector)
-    return out
-
-
-def _apply_each(matrix: Array, vectors: Array) -> Array:
-    """(3, 3, N) and (U, 3, N) -> (U, 3, N)."""
-    out: Array = np.einsum("ijn,ujn->uin", matrix, vectors)
-    return out

@@ -1,6 +1,7 @@
 """Laws of the fit: exact on exact data, true in its uncertainty, blunt about bad readings."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -54,10 +55,11 @@ def test_identify_exact_readings_leave_no_residual(simulated):
 
 
 def test_identify_jacobian_with_every_effect_against_central_differences(example):
-    rows = example("backlash-leg-3")
+    whole = example("backlash-leg-3")
+    frames = fit(Model(whole)).linear.state
+    rows = kept(whole, [name in ("", "7", "33", "61", "70") for name in whole.pose_name])
     model = Model(rows, catalogue(rows.machine))
     generator = np.random.default_rng(5)
-    frames = fit(Model(rows)).linear.state
     effects = tuple(
         np.array(
             [3.7 if u.nonlinear else 1e-2 * u.size * generator.standard_normal() for u in group]
@@ -67,6 +69,8 @@ def test_identify_jacobian_with_every_effect_against_central_differences(example
     begin = replace(model.start(frames.frame_rotation, frames.frame_position), effects=effects)
     linear = model.linearise(model.linearise(begin).state)
     for index, (name, prior) in enumerate(zip(model.names, model.prior, strict=True)):
+        if re.search("leg[2456]", name):
+            continue
         size = (
             1e-4 * (prior if np.isfinite(prior) else 1.0) * (1.0 if "frame" not in name else 1e-2)
         )
@@ -74,8 +78,7 @@ def test_identify_jacobian_with_every_effect_against_central_differences(example
         step = np.zeros(model.prior.size)
         step[index] = size
         ahead, back = (
-            model.linearise(model.linearise(model.moved(linear.state, sign * step)).state).residual
-            for sign in (1.0, -1.0)
+            model.linearise(model.moved(linear.state, sign * step)).residual for sign in (1.0, -1.0)
         )
         slope = np.einsum("ijn,jn->in", rows.whitener, (back - ahead) / (2.0 * size))
         own = linear.jacobian[index]
