@@ -13,7 +13,8 @@ import numpy as np
 from calib.arrays import Array
 from calib.effects.component import Effect
 from calib.identify.fitting import Fit
-from calib.model.prediction import Model, State, whitened_columns
+from calib.model.columns import whitened_columns
+from calib.model.prediction import Model, State
 from calib.poses.reach import PoseSet
 from calib.runs.stack import STEP_MM, STEP_RAD, Rows
 

@@ -12,7 +12,7 @@ from calib.discover.next_experiment import Blocks, Separation
 from calib.discover.run_problem import EffectColumns
 from calib.effects.component import Effect
 from calib.identify.fitting import Fit
-from calib.model.prediction import at_trial
+from calib.model.columns import at_trial
 from calib.runs.stack import Rows
 
 

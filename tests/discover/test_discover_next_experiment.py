@@ -17,7 +17,7 @@ from calib.discover.run_design import design_follow_up
 from calib.effects import effect_named
 from calib.errors import BadInput
 from calib.mechanism.solve import forward
-from calib.model.prediction import whitened_columns
+from calib.model.columns import whitened_columns
 from calib.poses.reach import sample_poses, solve_poses
 
 RUNS = Path(__file__).parents[1] / "data" / "runs"
