@@ -9,11 +9,13 @@ from scipy import stats
 from calib.arrays import Array
 from calib.discover.findings import Diagnosis, Finding
 from calib.discover.forward import Discovery
+from calib.discover.run_agreement import TOGETHER_WORSE, runs_at_odds, untrue_uncertainties
 from calib.discover.run_diagnosis import RunDiagnosis
 from calib.discover.run_discovery import RunStage, stage_of
 from calib.effects.component import Unknown
 from calib.identify.fitting import Fit
 from calib.identify.report import bad_readings, quality
+from calib.identify.starting import MOVED
 
 SMALLEST_P = 1e-300
 FEW_POSES = 15
@@ -142,13 +144,25 @@ def advice(found: RunDiagnosis) -> str:
     diagnosis = found.diagnosis
     bad = len(found.fit.bad)
     excluded = f" {_readings(bad)} excluded: see bad_readings." if bad else ""
-    rows = found.fit.model.rows
-    poses = len({name for name, on in zip(rows.pose_name, rows.on_platform, strict=True) if on})
+    if any(reading.why.endswith(MOVED) for reading in found.fit.bad):
+        excluded += " Many of these moved as one: make a run of its own of them."
+    poses = _poses(found.fit)
     if poses < FEW_POSES:
-        excluded += f" With {poses} poses only large effects would show: measure more."
+        named = "one pose" if poses == 1 else f"{poses} poses"
+        excluded += f" With {named} only large effects would show: measure more."
+    scatter = untrue_uncertainties(found.fit)
     if diagnosis.adequate:
+        if scatter:
+            return (
+                f"Nothing is missing that these readings show. {scatter}: correct them.{excluded}"
+            )
         return f"Nothing is missing: the model explains the readings to their noise.{excluded}"
     best = diagnosis.best
+    odds = runs_at_odds(found.fit)
+    if odds and (best is None or found.outlook(best).rms_mm > TOGETHER_WORSE * odds.apart_mm):
+        return f"{odds}.{excluded}"
+    if best is None and found.fit.chi2_per_dof < 1.0 and scatter:
+        excluded = f" {scatter}: correct them first.{excluded}"
     if best is None:
         return (
             f"Something is missing that no known effect explains; {_depends(diagnosis)}.{excluded}"
@@ -167,6 +181,13 @@ def advice(found: RunDiagnosis) -> str:
             f"{best.name} {others[0]} plans the readings that can"
         )
     return f"{text}.{excluded}"
+
+
+def _poses(fit: Fit) -> int:
+    """How many poses were read; those without a label are told apart by where they are."""
+    rows = fit.model.rows
+    on = np.flatnonzero(rows.on_platform)
+    return len({rows.pose_name[k] or tuple(rows.q[:, k].round(4).tolist()) for k in on})
 
 
 def _depends(diagnosis: Diagnosis) -> str:
