@@ -22,7 +22,8 @@ from calib.discover.structure import structure_candidates
 from calib.effects.component import Effect, Unknown
 from calib.identify.fitting import Fit, fit
 from calib.identify.holdout import HoldOut, hold_out, hold_out_of
-from calib.model.prediction import Model, State, whitened_columns
+from calib.model.columns import whitened_columns
+from calib.model.prediction import Model, State
 from calib.runs.stack import Rows
 
 

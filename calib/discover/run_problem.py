@@ -17,7 +17,7 @@ from calib.effects.component import Effect, Signature, Unknown
 from calib.effects.tracker import rigid_motions
 from calib.identify.fitting import Fit
 from calib.mechanism.rigid import rotate, to_euler
-from calib.model.prediction import at_trial, channels_known, whitened_columns
+from calib.model.columns import at_trial, channels_known, whitened_columns
 
 FIELDS = ("extension", "parameters", "nest", "point", "twist")
 
