@@ -82,14 +82,7 @@ def read_run(folder: str | Path) -> LoadedRun:
 def read_runs(folders: tuple[str, ...]) -> list[LoadedRun]:
     """Read several runs of one machine; raises BadInput where two machines are mixed."""
     loaded = [read_run(folder) for folder in folders]
-    for place, other in enumerate(loaded[1:], start=1):
-        for first in loaded[:place]:
-            if np.array_equal(first.run.position, other.run.position, equal_nan=True):
-                raise BadInput(
-                    f"the readings are those of {first.folder}",
-                    place=str(other.folder / POINTS),
-                    remedy="Name every run once: readings must not count twice",
-                )
+    for other in loaded[1:]:
         if other.machine.parameters != loaded[0].machine.parameters:
             raise BadInput(
                 f"machine {other.run.header.machine!r}, but {loaded[0].folder} has "
@@ -97,6 +90,14 @@ def read_runs(folders: tuple[str, ...]) -> list[LoadedRun]:
                 place=str(other.folder / HEADER),
                 remedy="Fit runs of one machine together",
             )
+    for place, other in enumerate(loaded):
+        for first in loaded[:place]:
+            if np.array_equal(first.run.position, other.run.position, equal_nan=True):
+                raise BadInput(
+                    f"the readings are those of {first.folder}",
+                    place=str(other.folder / POINTS),
+                    remedy="Name every run once: readings must not count twice",
+                )
     return loaded
 
 

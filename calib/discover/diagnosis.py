@@ -240,7 +240,24 @@ def _unexplained(judged: _Round, quadratic: Sequence[Quadratic], alpha: float) -
 
 def _dependence(scores: Scores, index: int, log_p: float) -> Dependence:
     candidate = scores.candidates[index]
-    evidence, _ = observed(scores, index)
-    _, trial = _best_hypothesis(scores, index)
-    period = candidate.trials[trial][0] if candidate.trials[trial] else None
+    evidence, parts = observed(scores, index)
+    number, trial = _best_hypothesis(scores, index)
+    period = None
+    if candidate.trials[trial]:
+        period = _peak([one[0] for one in candidate.trials], parts[number][:, 0], trial)
     return Dependence(candidate.channel, log_p, evidence, period)
+
+
+def _peak(periods: list[float], evidence: Array, best: int) -> float:
+    """Period at the top of a parabola through the best frequency tried and its neighbours."""
+    if not 0 < best < len(periods) - 1:
+        return periods[best]
+    near = slice(best - 1, best + 2)
+    frequency = 1.0 / np.array(periods[near])
+    shift, height = frequency - frequency[1], evidence[near] - evidence[best]
+    (left, right), (low, high) = shift[[0, 2]], height[[0, 2]]
+    curvature = (high / right - low / left) / (right - left)
+    if not curvature < 0.0:
+        return periods[best]
+    top = -0.5 * (high / right - curvature * right) / curvature
+    return float(1.0 / (frequency[1] + np.clip(top, min(shift), max(shift))))

@@ -126,13 +126,12 @@ def _levels(variable: Variable, carrier: Carrier) -> Candidate:
 
 
 def _periodic(variable: Variable, carrier: Carrier) -> Candidate:
-    """A sine and a cosine for every direction, at frequencies half an independent one apart."""
+    """A sine and a cosine for every direction, at frequencies of :func:`_frequencies`."""
     values = np.broadcast_to(variable.values, carrier.columns.shape)
     span = float(np.ptp(values, axis=1).max())
     apart = np.diff(np.unique(variable.values))
     shortest = variable.shortest or max(2.0 * float(np.median(apart)), span / 100.0)
-    steps = min(MOST_PERIODS, max(2, int(2.0 * span / shortest)))
-    frequencies = np.linspace(1.0 / span, max(1.0 / shortest, 1.5 / span), steps)
+    frequencies = _frequencies(span, shortest)
     phase = 2.0 * np.pi * frequencies[:, None, None] * (values - values.min())
     columns = np.concatenate([np.sin(phase), np.cos(phase)], axis=1)
     columns *= np.concatenate([carrier.columns, carrier.columns])
@@ -151,3 +150,17 @@ def _periodic(variable: Variable, carrier: Carrier) -> Candidate:
         subsets=subsets,
         channel=variable.name,
     )
+
+
+def _frequencies(span: float, shortest: float) -> Array:
+    """Frequencies half an independent one apart; where these are too many, the lower half of them.
+
+    What floors, air and shadows do is slow: the higher ones share the other half of what may be
+    tried.
+    """
+    highest = max(1.0 / shortest, 1.5 / span)
+    close = np.arange(1.0 / span, highest + 0.25 / span, 0.5 / span)
+    if close.size <= MOST_PERIODS:
+        return close
+    slow = close[: MOST_PERIODS // 2]
+    return np.concatenate([slow, np.linspace(slow[-1], highest, MOST_PERIODS // 2 + 1)[1:]])

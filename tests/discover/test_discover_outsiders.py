@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 
 from app.cli import run as pkmcal
+from mocks.physics.hidden import Hidden
+from mocks.simulate import RunPlan, simulate
+from mocks.simulate.files import write
 
 RUNS = Path(__file__).parents[1] / "data" / "runs"
 CLEAN = RUNS / "no-effect"
@@ -152,3 +155,13 @@ def test_discover_outsiders_every_pass_in_another_hole_is_told(capsys, changed):
     run = changed(lambda rows: [r | {"nest": holes.get(r["nest"], r["nest"])} for r in rows])
     assert pkmcal(["fit", run]) == 2
     assert "reads as nest 3, was labelled 4" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("period", [400.0, 1020.0])
+def test_discover_outsiders_period_in_time_is_named(capsys, tmp_path, period):
+    tide = {"unknown.tide.amplitude": 0.02, "unknown.tide.period": period}
+    write(simulate(RunPlan(seed=41, poses=60, noise_mm=0.005, hidden=Hidden(tide))), tmp_path)
+    found = answer(capsys, "diagnose", tmp_path)
+    assert found["unexplained"]["channels"][0] == "time_s"
+    assert found["unexplained"]["periods"]["time_s"] == pytest.approx(period, rel=0.03)
+    assert f"{period / 60:.0f} min" in found["advice"]
