@@ -7,8 +7,8 @@ from typing import Any, TypeVar
 import click
 
 from app import answer
-from app.model_files import chosen_effects
-from app.run_files import read_runs
+from app.files.models import chosen_effects
+from app.files.runs import read_runs
 from calib.discover.run_discovery import Refitter
 from calib.effects import Effect, catalogue
 from calib.runs.stack import Rows, stack

@@ -5,7 +5,7 @@ from typing import Any, TypeVar
 
 import click
 
-from app.machine_files import load_machine
+from app.files.machines import load_machine
 from calib.mechanism.description import Machine
 from calib.mechanism.variants import with_closure
 

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from app.machine_files import read_text
+from app.files.machines import read_text
+from app.files.site import Site, load_site
 from app.session.journal import Journal, Row
 from app.session.plan import Plan, Pose
 from app.session.plans import PlanOptions, measure_plan, order_for
-from app.site import Site, load_site
 from calib.arrays import Array
 from calib.errors import BadInput
 from calib.frames import Frame, fit_frame

@@ -19,7 +19,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from app.machine_files import load_machine
+from app.files.machines import load_machine
 from bench._blind_cases import SIGMA_MM, Case, build, displaced, draw_cases
 from bench._blind_page import page
 from calib.discover.pairs import power

@@ -16,7 +16,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from app.run_files import read_run
+from app.files.runs import read_run
 from calib.identify import fit
 from calib.model import Model
 from calib.model.synthetic import drawn_from_prior, synthetic_rows

@@ -15,7 +15,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from app.machine_files import load_machine
+from app.files.machines import load_machine
 from calib.discover import LinearProblem, diagnose, structure_candidates
 from calib.discover.run_diagnosis import diagnose_fit
 from calib.discover.run_problem import (

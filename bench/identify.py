@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
-from app.run_files import read_run
+from app.files.runs import read_run
 from calib.identify import fit
 from calib.identify.starting import begin as begin_fit
 from calib.model import Model

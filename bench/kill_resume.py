@@ -16,8 +16,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from app.pose_table import poses_text
-from app.run_files import read_run
+from app.files.pose_table import poses_text
+from app.files.runs import read_run
 from app.session.folder import JOURNAL, read_folder
 from app.session.journal import Journal
 

@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 
-from app.machine_files import load_machine
+from app.files.machines import load_machine
 from bench._hexapod_closed_form import HexapodClosedForm, PoseFirst
 from calib.arrays import Array
 from calib.mechanism.closure import State, _twists, sweep

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.machine_files import load_machine, shipped_machines
+from app.files.machines import load_machine, shipped_machines
 from calib.analysis.coverage import workspace_poses
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.solve import forward, inverse

@@ -12,7 +12,7 @@ import time
 
 import numpy as np
 
-from app.machine_files import load_machine
+from app.files.machines import load_machine
 from calib.poses import sample_poses
 from calib.poses.choose import Criterion
 from calib.poses.design import choose_poses

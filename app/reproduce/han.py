@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from app.machine_files import load_machine
+from app.files.machines import load_machine
 from app.reproduce.papers import paper
 from app.reproduce.pose_fit import PoseFit, fit_poses
 from calib.arrays import Array, IntArray

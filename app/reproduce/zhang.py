@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from app.machine_files import load_machine
+from app.files.machines import load_machine
 from app.reproduce.papers import paper
 from app.reproduce.pose_fit import fit_poses
 from app.reproduce.rows import BETTER, Row, compare, unreachable

@@ -9,9 +9,9 @@ from typing import Any
 
 import tomli_w
 
+from app.files.site import Site
 from app.session.journal import Journal, Row
 from app.session.plan import Plan
-from app.site import Site
 
 _SAME = 1e-9
 

@@ -3,10 +3,10 @@
 from datetime import UTC, datetime
 from pathlib import Path
 
-from app.machine_files import read_text
+from app.files.machines import read_text
+from app.files.site import Site, parse_site
 from app.session.journal import Journal
 from app.session.plan import Plan
-from app.site import Site, parse_site
 from calib.errors import BadInput
 
 SITE, PLAN, JOURNAL, RUN = "site.toml", "plan.json", "journal.sqlite", "run"

@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any, Protocol
 
 from app.errors import StoppedByOperator
-from app.site import Site
+from app.files.site import Site
 from drivers.errors import ConnectFailed, LinkLost, NoTarget, Refused, Silence
 
 Ask = Callable[[str, tuple[str, ...]], Awaitable[str]]

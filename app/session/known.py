@@ -14,9 +14,9 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from app.machine_files import read_text
+from app.files.machines import read_text
+from app.files.site import Site
 from app.session.ownership import state_folder
-from app.site import Site
 from calib.errors import BadInput
 from drivers.errors import ParameterError
 from drivers.interface import Identity, MotionController

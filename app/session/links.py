@@ -1,6 +1,6 @@
 """Which driver speaks to which kind of device of the site file."""
 
-from app.site import Site
+from app.files.site import Site
 from drivers.canopen.controller import CanopenController
 from drivers.emscon.tracker import EmsconTracker
 from drivers.gcs.axes import Axes

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from app.files.site import Site
 from app.session.plan import Plan, PlanWriter, Pose
-from app.site import Site
 from calib.errors import BadInput
 
 Order = Literal["nest-by-nest", "pose-by-pose"]

@@ -22,6 +22,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from app.errors import GateRefused, StoppedByOperator
+from app.files.site import Site
 from app.session.events import (
     Fault,
     Finished,
@@ -43,7 +44,6 @@ from app.session.recall import recall
 from app.session.routines import EVERY_TIME, NEVER_SKIPPED, ROUTINES
 from app.session.station import Station
 from app.session.work import Done, StartOver, Work
-from app.site import Site
 from calib.errors import BadInput
 from drivers.errors import DeviceError
 from drivers.interface import Alarm

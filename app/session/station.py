@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from app.clock import Clock
+from app.files.site import Site
 from app.session.events import (
     AlarmRaised,
     Connected,
@@ -16,7 +17,6 @@ from app.session.events import (
 from app.session.hands import Carrier, carrier_of
 from app.session.links import open_controller, open_tracker
 from app.session.ownership import Ownership
-from app.site import Site
 from drivers.errors import ConnectFailed, DeviceError
 from drivers.interface import Alarm, Identity, MotionController, Tracker
 

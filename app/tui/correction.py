@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.errors import GateRefused, StoppedByOperator
-from app.fit_file import read_fit
+from app.files.fits import read_fit
 from app.session import events as ev
 from app.session.known import Snapshot, compare_with_known
 from app.session.session import Session
@@ -80,7 +80,7 @@ class Corrections:
         inside = folder.name == "run" and (folder.parent / "journal.sqlite").is_file()
         model = (folder.parent if inside else self._desk.root) / "model.toml"
         model.parent.mkdir(parents=True, exist_ok=True)
-        from app.model_files import write_model  # brings scipy's statistics: not at start
+        from app.files.models import write_model  # brings scipy's statistics: not at start
 
         write_model(model, answer.fit)
         return model

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from app.errors import GateRefused, StoppedByOperator
+from app.files.site import Site, load_site, site_of_mock
 from app.session import events as ev
 from app.session.plan import Plan
 from app.session.session import Outcome, Session
 from app.session.station import Station
-from app.site import Site, load_site, site_of_mock
 from app.tui.correction import KEEP, Corrections
 from app.tui.picture import Picture
 from app.tui.study import Study

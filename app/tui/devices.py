@@ -9,8 +9,8 @@ from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.content import Content
 from textual.widgets import Static
 
+from app.files.site import Site
 from app.session.events import Connected
-from app.site import Site
 from app.tui.dialogs import Choose, Enter, Pick, site_candidates
 from app.tui.face import Face
 from app.tui.picture import Picture

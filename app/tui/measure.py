@@ -10,7 +10,7 @@ from textual.containers import Horizontal, Vertical
 from textual.content import Content
 from textual.widgets import Static
 
-from app.site import Site
+from app.files.site import Site
 from app.tui.dialogs import Pick
 from app.tui.face import Face
 from app.tui.picture import Picture

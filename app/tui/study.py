@@ -123,7 +123,7 @@ class Study:
         """Write the fitted model to a file."""
         if self.answer is None:
             raise BadInput("nothing is fitted yet", remedy="Fit a run first")
-        from app.model_files import write_model
+        from app.files.models import write_model
 
         write_model(path, self.answer.fit)
         self._picture.write(f"model written to {path}", "good")

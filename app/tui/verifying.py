@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from app.files.site import Site
 from app.session import Plan
-from app.site import Site
 from app.verification import Verification, judge_session
 from app.verification import verification_plan as plan_for
 from calib.arrays import Array

@@ -10,9 +10,9 @@ import click
 
 from app import answer
 from app.console import ConsoleFace, in_daemon_thread, stopping, unattended
-from app.fit_file import SavedFit, read_fit
+from app.files.fits import SavedFit, read_fit
+from app.files.site import Site, load_site
 from app.session.station import Station
-from app.site import Site, load_site
 from app.writeback.gates import LIMITS, Gates
 from app.writeback.procedure import Applied, WriteBack
 from app.writeback.proposal import Change, Proposal

@@ -11,8 +11,8 @@ import numpy as np
 
 from app import answer
 from app.analysis import load_refitter, model_options
-from app.compare_charts import write_charts
-from app.run_files import outside_runs
+from app.files.runs import outside_runs
+from app.show.compare_charts import write_charts
 from calib.discover.compare_report import compare_report
 from calib.discover.run_compare import compare_fit
 from calib.discover.run_discovery import SEED

@@ -11,8 +11,8 @@ import numpy as np
 
 from app import answer
 from app.analysis import load_refitter, model_options
-from app.pose_files import render_pose_file
-from app.run_files import outside_runs
+from app.files.poses import render_pose_file
+from app.files.runs import outside_runs
 from calib.discover.run_design import CANDIDATES, Plan, design_follow_up
 from calib.effects import effect_named
 from calib.errors import BadInput

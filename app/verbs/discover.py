@@ -10,8 +10,8 @@ import click
 
 from app import answer
 from app.analysis import load_refitter, model_options
-from app.model_files import write_model
-from app.run_files import outside_runs
+from app.files.models import write_model
+from app.files.runs import outside_runs
 from app.verbs.diagnose import bad_lines, sizes, um
 from calib.discover.run_discovery import discover_run, stage_of
 from calib.discover.run_report import discovery_report

@@ -10,8 +10,8 @@ import click
 
 from app import answer
 from app.analysis import load_rows, model_options
-from app.model_files import write_model
-from app.run_files import outside_runs
+from app.files.models import write_model
+from app.files.runs import outside_runs
 from calib.discover.run_agreement import runs_at_odds
 from calib.discover.run_diagnosis import fit_effects
 from calib.identify import fit_report

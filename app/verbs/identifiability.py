@@ -8,9 +8,9 @@ import numpy as np
 
 from app import answer
 from app.analysis_options import chosen_machine, machine_options
-from app.identifiability_words import report
-from app.pose_files import nest_matrix, read_pose_file
-from app.site import load_site
+from app.files.poses import nest_matrix, read_pose_file
+from app.files.site import load_site
+from app.show.identifiability_words import report
 from calib.analysis.benefit import options
 from calib.analysis.coverage import workspace_poses
 from calib.analysis.gauge import gauges

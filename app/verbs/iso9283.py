@@ -8,7 +8,7 @@ import click
 import numpy as np
 
 from app import answer
-from app.run_files import read_run
+from app.files.runs import read_run
 from calib.analysis.cycles import Attained, Campaign, campaign
 from calib.analysis.iso9283 import (
     CYCLES,

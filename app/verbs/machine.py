@@ -8,10 +8,10 @@ import numpy as np
 
 from app import answer
 from app.analysis_options import chosen_machine, machine_options
-from app.machine_drawing import draw_figure, draw_text
-from app.machine_files import load_machine
+from app.files.machines import load_machine
 from app.machine_templates import TEMPLATES
-from app.machine_words import inspection_data, inspection_words
+from app.show.machine_drawing import draw_figure, draw_text
+from app.show.machine_words import inspection_data, inspection_words
 from calib.analysis.inspection import inspect
 from calib.analysis.skeleton import skeleton
 from calib.errors import BadInput

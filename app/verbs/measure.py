@@ -8,10 +8,10 @@ import click
 
 from app import answer
 from app.console import run_on_console, unattended
-from app.pose_files import read_any_poses
+from app.files.poses import read_any_poses
+from app.files.site import load_site
 from app.session import Outcome, PlanOptions, Session, measure_plan
 from app.session.plans import Order, order_for
-from app.site import load_site
 
 
 def outcome_json(outcome: Outcome) -> dict[str, Any]:

@@ -7,10 +7,10 @@ import click
 import numpy as np
 
 from app import answer
-from app.machine_files import load_machine
-from app.pose_files import full_poses, nest_matrix, render_design, render_pose_file
-from app.pose_table import poses_text
-from app.site import load_site
+from app.files.machines import load_machine
+from app.files.pose_table import poses_text
+from app.files.poses import full_poses, nest_matrix, render_design, render_pose_file
+from app.files.site import load_site
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.poses.design import CANDIDATES, TABLE, Design, design_poses

@@ -6,8 +6,8 @@ import click
 
 from app import answer
 from app.analysis import model_options
+from app.files.runs import outside_runs
 from app.report.build import write_report
-from app.run_files import outside_runs
 
 
 @click.command()

@@ -8,7 +8,7 @@ import numpy as np
 
 from app import answer
 from app.analysis_options import bars, chosen_machine, machine_options
-from app.charts import sensitivity_chart
+from app.show.charts import sensitivity_chart
 from calib.analysis.coverage import workspace_poses
 from calib.analysis.sensitivity import Index, Sensitivity, Tolerance, sensitivity, tolerances
 from calib.errors import BadInput

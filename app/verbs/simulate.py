@@ -7,8 +7,8 @@ import click
 import numpy as np
 
 from app import answer
-from app.pose_files import read_any_poses
-from app.run_files import HEADER, POINTS
+from app.files.poses import read_any_poses
+from app.files.runs import HEADER, POINTS
 from calib.errors import BadInput
 from calib.mechanism.rigid import Poses
 from calib.mechanism.task import task_values

@@ -8,9 +8,9 @@ import click
 
 from app import answer
 from app.console import ConsoleFace
+from app.files.site import load_site
 from app.session.known import Snapshot, Snapshots
 from app.session.station import Station
-from app.site import load_site
 from app.writeback.procedure import accept, undo
 from app.writeback.transfer import snapshots_of
 from calib.errors import BadInput

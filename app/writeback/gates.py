@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.errors import GateRefused
-from app.fit_file import SavedFit
+from app.files.fits import SavedFit
 from app.session.events import GateChecked
 from app.writeback.proposal import Proposal
 from calib.arrays import Array

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.errors import GateRefused, StoppedByOperator
-from app.fit_file import SavedFit
+from app.files.fits import SavedFit
 from app.session.events import Stage, WriteBackStage
 from app.session.known import Held, Snapshot, compare_with_known
 from app.session.plan import Pose

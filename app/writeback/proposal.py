@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from app.fit_file import SavedFit
+from app.files.fits import SavedFit
 from calib.effects import effect_named
 from calib.errors import BadInput
 from calib.mechanism.description import Machine

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from app.machine_files import load_machine, shipped_machines
+from app.files.machines import load_machine, shipped_machines
 from app.verbs.identifiability import command
 from calib.analysis.benefit import options
 from calib.analysis.coverage import workspace_poses

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from app.machine_files import load_machine
+from app.files.machines import load_machine
 from app.verbs.iso9283 import command
 from calib.analysis.iso9283 import (
     RP_OF_SIGMA,

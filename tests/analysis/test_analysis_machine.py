@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from app.braille import Canvas
-from app.machine_files import load_machine, shipped_machines
+from app.files.machines import load_machine, shipped_machines
 from app.machine_templates import TEMPLATES
+from app.show.braille import Canvas
 from app.verbs.machine import command
 from calib.analysis.inspection import inspect
 from calib.analysis.skeleton import skeleton

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from app.machine_files import load_machine, shipped_machines
+from app.files.machines import load_machine, shipped_machines
 from app.verbs.sensitivity import command
 from calib.analysis.coverage import workspace_poses
 from calib.analysis.sensitivity import kind_of, local_indices, sensitivity, tolerances

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 from discover_synthetic import POSES, Lab
 
-from app.run_files import read_runs
+from app.files.runs import read_runs
 from app.verbs.compare import command
 from calib.discover import Carrier, Variable, pure_error
 from calib.discover.compare import compare_structure

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.machine_files import load_machine
+from app.files.machines import load_machine
 from calib.discover.run_diagnosis import fit_effects
 from calib.discover.run_problem import columns_at
 from calib.effects import effect_named

@@ -8,8 +8,8 @@ import pytest
 from click.testing import CliRunner
 
 from app.analysis import load_refitter
-from app.machine_files import load_machine
-from app.pose_files import read_pose_file
+from app.files.machines import load_machine
+from app.files.poses import read_pose_file
 from app.verbs.design import command
 from calib.discover.follow_up import FollowUp, own_to_each_run
 from calib.discover.next_experiment import Blocks, Separation, choose_sequence

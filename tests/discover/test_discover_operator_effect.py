@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.run_files import read_runs
+from app.files.runs import read_runs
 from calib.effects import effect_named
 from calib.effects.expression import linear_unknowns, parse_expression
 from calib.effects.operator import effect_from_text

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from discover_synthetic import POSES, Lab
 
-from app.run_files import read_runs
+from app.files.runs import read_runs
 from calib.discover import Candidate, Term
 from calib.discover.run_terms import library, propose
 from calib.discover.terms import select_terms

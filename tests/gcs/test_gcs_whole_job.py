@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from app.site import parse_site
+from app.files.site import parse_site
 from calib.errors import BadInput
 from mocks.gcs.tripod_kinematics import position_of
 from mocks.physics.truth import machine_file, nominal_parameters

@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.run_files import read_run
+from app.files.runs import read_run
 from calib.effects import effect_named
 from calib.identify import fit
 from calib.model import Model

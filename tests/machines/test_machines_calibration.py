@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.machine_files import load_machine, shipped_machines
+from app.files.machines import load_machine, shipped_machines
 from calib.identify import fit
 from calib.mechanism.rigid import from_euler
 from calib.model import Model

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from app.machine_files import load_machine
+from app.files.machines import load_machine
 from calib.mechanism.solve import forward
 from calib.mechanism.variants import with_closure
 from mocks.physics.actuators import Circumstances, Load

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.cli import run
-from app.machine_files import load_machine
+from app.files.machines import load_machine
 from calib.discover.run_diagnosis import fit_effects
 from calib.runs import parse_run
 from calib.runs.stack import stack

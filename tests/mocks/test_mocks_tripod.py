@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.machine_files import load_machine
+from app.files.machines import load_machine
 from calib.mechanism.solve import forward
 from mocks.physics.parallelograms import settle, sides
 from mocks.physics.pose import Array, Pose

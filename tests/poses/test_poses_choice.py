@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from app.machine_files import load_machine
+from app.files.machines import load_machine
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.limits import within_limits

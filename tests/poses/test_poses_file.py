@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from app.machine_files import load_machine
-from app.pose_files import parse_pose_file, read_any_poses, read_pose_file
+from app.files.machines import load_machine
+from app.files.poses import parse_pose_file, read_any_poses, read_pose_file
 from app.verbs.poses import command
 from calib.errors import BadInput
 

@@ -2,7 +2,7 @@ import itertools
 
 import numpy as np
 
-from app.machine_files import load_machine
+from app.files.machines import load_machine
 from calib.poses import sample_poses
 from calib.poses.path import check_path, distances, path_length, short_order
 

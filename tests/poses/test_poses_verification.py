@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from app.machine_files import load_machine, shipped_machines
+from app.files.machines import load_machine, shipped_machines
 from calib.mechanism.limits import within_limits
 from calib.mechanism.solve import forward
 from calib.poses import verification_poses

@@ -15,7 +15,7 @@ from session_mock import POSES, Mock, site_text
 
 from app import answer
 from app.cli import TASKS, VERBS, pkmcal, run
-from app.pose_table import poses_text
+from app.files.pose_table import poses_text
 
 
 def cli(*arguments: str, folder: Path) -> "subprocess.CompletedProcess[str]":

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from session_mock import POSES, Mock
 
-from app.pose_table import poses_text
+from app.files.pose_table import poses_text
 from app.session.journal import Journal
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from session_mock import POSES, Heard, Mock
 
-from app.run_files import read_run
+from app.files.runs import read_run
 from app.session import PlanOptions, Session, measure_plan
 from app.session import events as ev
 from app.session.plans import Order

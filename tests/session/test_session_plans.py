@@ -8,11 +8,11 @@ import pytest
 from session_mock import POSES, site_text
 
 from app.errors import GateRefused
+from app.files.site import Site, parse_site
 from app.session.path import check_waypoints, waypoints
 from app.session.plan import Plan
 from app.session.plans import Order, PlanOptions, measure_plan
 from app.session.routines import ROUTINES
-from app.site import Site, parse_site
 from calib.errors import BadInput
 
 

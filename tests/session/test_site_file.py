@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from session_mock import site_text
 
-from app.site import parse_site
+from app.files.site import parse_site
 from calib.errors import BadInput
 
 

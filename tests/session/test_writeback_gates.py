@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from app.errors import GateRefused
-from app.fit_file import Estimate, SavedFit
-from app.machine_files import load_machine
+from app.files.fits import Estimate, SavedFit
+from app.files.machines import load_machine
 from app.verification import Summary
 from app.writeback.gates import Gates, gates_of_check, gates_of_proposal, refuse_if_any
 from app.writeback.proposal import propose

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from session_mock import POSES, Mock
 
-from app.pose_table import poses_text
+from app.files.pose_table import poses_text
 
 
 def program(*arguments: str) -> list[str]:

@@ -9,9 +9,9 @@ import pytest
 from session_mock import POSES, Heard, Mock
 
 from app.errors import GateRefused, StoppedByOperator
-from app.fit_file import Estimate, SavedFit, read_fit
-from app.model_files import write_model
-from app.run_files import read_run
+from app.files.fits import Estimate, SavedFit, read_fit
+from app.files.models import write_model
+from app.files.runs import read_run
 from app.session import PlanOptions, Session, measure_plan
 from app.session import events as ev
 from app.session.known import compare_with_known, read_held

@@ -25,6 +25,7 @@ async def full(pilot: Pilot[Any], folder: Path) -> Workbench:
     desk = bench.desk
     desk.study.choose((str(RUN),))
     await desk.study.identify()
+    desk.study.search = stream.searched()
     desk.before, desk.after = stream.verified(600.0, 1), stream.verified(5.0, 2)
     desk.corrections.comparison = stream.compared()
     desk.corrections.snapshots = stream.snapshots()
@@ -39,11 +40,7 @@ async def full(pilot: Pilot[Any], folder: Path) -> Workbench:
 @pytest.mark.parametrize("number", range(1, len(FACES) + 1), ids=[face.mode for face in FACES])
 def test_screen(snap_compare: Look, tmp_path: Path, number: int, size: tuple[int, int]) -> None:
     async def show(pilot: Pilot[Any]) -> None:
-        bench = await full(pilot, tmp_path)
-        if FACES[number - 1].mode == "discover":
-            bench.desk.study.choose((str(RUN.parent / "backlash-leg-3"),))
-            await bench.desk.study.diagnose()
-            await bench.desk.study.change("add", "backlash")
+        await full(pilot, tmp_path)
         await pilot.press(str(number))
         await pilot.pause(0.5)
 
@@ -79,7 +76,7 @@ def test_question_with_a_fault_on_the_banner(
 def test_dialog(snap_compare: Look, tmp_path: Path, key: str) -> None:
     async def show(pilot: Pilot[Any]) -> None:
         if key == "n":
-            from app.site import load_site
+            from app.files.site import load_site
             from app.tui.planning import NewRun
 
             (tmp_path / "site.toml").write_text(stream.SITE, encoding="utf-8")

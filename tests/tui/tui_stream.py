@@ -5,12 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
+from app.files.site import Site
 from app.session import PlanOptions, Session, measure_plan
 from app.session import events as ev
 from app.session.known import Snapshot
 from app.session.plan import Plan
-from app.site import Site
 from app.tui.correction import Comparison
+from app.tui.discovering import Search, Stair, View
 from app.tui.program import Workbench
 from app.tui.verifying import Verified
 from app.verification import Verification
@@ -170,3 +171,56 @@ def snapshots() -> tuple[Snapshot, ...]:
         Snapshot(n, f"2026-11-0{n}T08:00:00+00:00", why, "hexapod", CONTROLLER, 7, {"leg1.L0": 1.0})
         for n, why in ((1, "before applying model.toml"), (2, "applied model.toml"))
     )
+
+
+def searched() -> Search:
+    """A discovery after one step: what is left, where it fails, candidates."""
+    candidates = [
+        {
+            "effect": name,
+            "p_value": p,
+            "rms_after_um": 8.2 + 0.1 * number,
+            "holdout_rms_after_um": 9.2 + 0.1 * number,
+            "visible": 0.9 - 0.05 * number,
+            "parameters": [
+                {"name": f"{name}.c", "value": 1.35e-4, "sigma": 1.2e-5, "unit": "mm/N"}
+            ],
+        }
+        for number, (name, p) in enumerate(
+            [("gravity-sag", 9e-17), ("screw-pitch", 0.1), ("joint-tilt", 0.8), ("settling", 1.0)]
+        )
+    ]
+    structure = [
+        {
+            "channel": channel,
+            "significant": number < 2,
+            "explains_um": 3.0 - number,
+            "p_value": 10.0 ** (3 * number - 6),
+            "period": 4.08 if number == 0 else None,
+            "shows_in": "extension of q4",
+            "unit": "um",
+            "bins": [
+                {"from": k, "to": k + 1.0, "readings": 30, "value": 5 * math.sin(k), "sigma": 1.0}
+                for k in range(6)
+            ],
+        }
+        for number, channel in enumerate(("q4", "payload_kg", "time_s"))
+    ]
+    diagnosis = {
+        "adequate": False,
+        "candidates": candidates,
+        "indistinguishable": [["gravity-sag", "tracker-drift"]],
+        "advice": "Add gravity-sag (the legs give way under the weight of platform and payload): "
+        "the error on held-out poses falls from 10.0 to 9.2 um.",
+    }
+    comparison = {"structure": structure, "repeatability": {"times_stated_sigma": 0.97}}
+    found = [
+        {"name": f"screw-cyclic.leg{leg}.sin", "value": 0.0019, "sigma": 0.0005, "unit": "mm"}
+        for leg in range(1, 7)
+    ]
+    stairs = [
+        Stair("start", 11.0, 8.38, 12.39, 9.04, 1.72),
+        Stair("+ screw-cyclic", 8.74, 8.31, 9.98, 9.18, 1.11),
+    ]
+    view = View(("screw-cyclic",), None, diagnosis, comparison, found)
+    return Search((), None, stairs, view)

@@ -14,7 +14,7 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 
-from app.machine_files import read_text
+from app.files.machines import read_text
 from app.session.plan import Pose
 from calib.errors import BadInput
 

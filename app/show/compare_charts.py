@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from app.charts import ANGLE, LENGTH, save
+from app.show.charts import ANGLE, LENGTH, save
 from calib.discover.compare import Speaking
 from calib.discover.compare_report import acts_on, factor_of
 from calib.discover.run_compare import Comparison

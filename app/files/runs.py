@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.machine_files import load_machine
+from app.files.machines import load_machine
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.runs import Run, format_run, parse_header, parse_run

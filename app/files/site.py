@@ -42,8 +42,8 @@ from typing import Any
 
 import tomli_w
 
-from app.machine_files import load_machine, read_text
-from app.toml_reader import TableReader
+from app.files.machines import load_machine, read_text
+from app.files.toml_reader import TableReader
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.toml_place import load_toml

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
-from app.braille import Canvas, beside
-from app.charts import save
+from app.show.braille import Canvas, beside
+from app.show.charts import save
 from calib.analysis.skeleton import LimbLine, Skeleton
 from calib.arrays import Array
 
