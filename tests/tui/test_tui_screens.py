@@ -12,7 +12,6 @@ from app.session.events import WriteBackStage
 from app.tui.program import FACES, Workbench
 
 SIZES = [(80, 24), (160, 48)]
-RUN = Path(__file__).parent.parent / "data" / "runs" / "no-effect"
 
 Look = Callable[..., bool]
 
@@ -23,8 +22,7 @@ async def full(pilot: Pilot[Any], folder: Path) -> Workbench:
     assert isinstance(bench, Workbench)
     await stream.put_up(bench, folder)
     desk = bench.desk
-    desk.study.choose((str(RUN),))
-    await desk.study.identify()
+    desk.study.answer = stream.fitted()
     desk.study.search = stream.searched()
     desk.before, desk.after = stream.verified(600.0, 1), stream.verified(5.0, 2)
     desk.corrections.comparison = stream.compared()

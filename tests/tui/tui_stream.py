@@ -10,6 +10,7 @@ from app.session import PlanOptions, Session, measure_plan
 from app.session import events as ev
 from app.session.known import Snapshot
 from app.session.plan import Plan
+from app.tui.analysis import FitAnswer
 from app.tui.correction import Comparison
 from app.tui.discovering import Search, Stair, View
 from app.tui.program import Workbench
@@ -224,3 +225,39 @@ def searched() -> Search:
     ]
     view = View(("screw-cyclic",), None, diagnosis, comparison, found)
     return Search((), None, stairs, view)
+
+
+def fitted() -> FitAnswer:
+    """A fit of six legs with one parameter in four left open."""
+    parameters = [
+        {
+            "name": f"leg{leg}.{name}",
+            "value": 100.1 + leg,
+            "sigma": 0.01 * leg,
+            "unit": "mm",
+            "nominal": 100.0 + leg,
+            "identified": name != "L_B",
+        }
+        for leg in range(1, 7)
+        for name in ("B_x", "B_y", "B_z", "L_B")
+    ]
+    alone = [f"leg{leg}.L_B" for leg in range(1, 7)]
+    report = {
+        "effects": [],
+        "readings": 95,
+        "rms_um": 8.39,
+        "noise_floor_um": 8.3,
+        "holdout_rms_um": 9.65,
+        "holdout_floor_um": 9.18,
+        "chi2_per_dof": 1.02,
+        "parameters": parameters,
+        "unidentified": [[name] for name in alone],
+        "unidentified_words": [f"{name} is not seen" for name in alone],
+        "bad_readings": [{"line": 118, "why": "reads as nest 4, was labelled 5"}],
+        "left_out_readings": 0,
+    }
+    generator = np.random.default_rng(3)
+    before, after = np.abs(generator.normal(0.0, [[0.25], [0.006]], (2, 95)))
+    return FitAnswer(
+        ("sessions/20261122-0800-hexapod-measure/run",), (), None, report, before, after
+    )
