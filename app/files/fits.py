@@ -48,6 +48,8 @@ class SavedFit:
     quality: Mapping[str, float]
     covariance: Array
     correlated: bool
+    compensation: Mapping[str, float] | None = None
+    """What the controller compensated while the runs were taken; None if the file is silent."""
 
     def covariance_of(self, names: list[str]) -> Array:
         """Covariance of some parameters, in that order."""
@@ -81,7 +83,27 @@ def read_fit(path: Path) -> SavedFit:
         raise BadInput("it holds no parameters", place=source, remedy="Fit again with --save")
     covariance, correlated = _covariance(estimates, data.get("correlations"), source)
     machine = str(data.get("machine", ""))
-    return SavedFit(source, machine, effects, estimates, quality, covariance, correlated)
+    return SavedFit(
+        source,
+        machine,
+        effects,
+        estimates,
+        quality,
+        covariance,
+        correlated,
+        _compensation(data.get("compensation"), source),
+    )
+
+
+def _compensation(table: Any, source: str) -> dict[str, float] | None:
+    if table is None:
+        return None
+    try:
+        return {str(name): float(value) for name, value in table.items()}
+    except (AttributeError, TypeError, ValueError) as error:
+        raise BadInput(
+            f"its compensation cannot be read ({error})", place=source, remedy="Fit again"
+        ) from error
 
 
 def _json(text: str, source: str) -> dict[str, Any]:

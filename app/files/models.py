@@ -70,6 +70,26 @@ def read_model(path: Path) -> ModelFile:
     return ModelFile(str(table.get("machine", "")), tuple(effects), own, values, sigmas)
 
 
+def compensation_of(fit: Fit) -> dict[str, float]:
+    """What the controller compensated while the runs were taken, by its names; missing is zero.
+
+    What a fit finds is what was left *beside* that.
+
+    Raises
+    ------
+    BadInput
+        If it was not the same in all runs.
+    """
+    held = [dict(run.header.compensation) for run in fit.model.rows.runs]
+    if any(other != held[0] for other in held[1:]):
+        raise BadInput(
+            "the controller's compensation values were not the same in all runs",
+            place=fit.model.rows.runs[0].source,
+            remedy="Fit runs that were taken with the same values, or leave --save out",
+        )
+    return held[0]
+
+
 def write_model(path: Path, fit: Fit) -> None:
     """Write what a fit found, correlations included."""
     report = fit_report(fit)
@@ -80,6 +100,7 @@ def write_model(path: Path, fit: Fit) -> None:
         "machine": fit.model.rows.runs[0].header.machine,
         "runs": [run.source for run in fit.model.rows.runs],
         "effects": report["effects"],
+        "compensation": compensation_of(fit),
         "own_effects": {
             effect.id: effect.text for effect in fit.model.effects if isinstance(effect, OwnEffect)
         },

@@ -50,18 +50,10 @@ class Corrections:
         self.snapshots: tuple[Snapshot, ...] = ()
         self.running: WriteBack | None = None
         self._answer: asyncio.Future[str] | None = None
-        self._kept: object = None
-        """The fit that was written last and kept."""
 
     async def compare(self) -> None:
         """Read the controller and judge the fit on the Fit screen; nothing is written."""
         station = self._desk.idle_station("compare")
-        if self._kept is not None and self._kept is self._desk.study.answer:
-            # Compensations add up: what a fit has found must not be written twice.
-            raise GateRefused(
-                "this fit is in the controller already",
-                remedy="Measure again to see what is left, or undo (u)",
-            )
         model = self._model_file()
         held = await compare_with_known(station.site, station.controller)
 
@@ -110,7 +102,6 @@ class Corrections:
             raise
         else:
             self._desk.picture.run = "finished"
-            self._kept = self._desk.study.answer
         finally:
             self.running = None
             self.comparison = None
@@ -177,7 +168,7 @@ class Corrections:
         with contextlib.ExitStack() as after:
             after.callback(self.list_snapshots, station)
             await self._desk.as_job(undo(station, snapshot, f"undo to set {snapshot.number}"))
-        self.comparison = self._kept = None
+        self.comparison = None
         self._desk.picture.run = "finished"
         self._desk.picture.write(f"set {snapshot.number} is back in the controller", "good")
 

@@ -1,8 +1,8 @@
 """What a fit would write to a controller, what it would not, and why not.
 
 Effects of the *measurement* are never written. Of the machine effects a controller can take those
-for which it has compensation values; a value that it holds already is added to, since what was
-fitted is what was left.
+for which it has compensation values. What was fitted is what was left beside the values that it
+used while the run was taken, so the two are added: writing a fit twice writes the same values.
 """
 
 import math
@@ -72,10 +72,16 @@ def propose(machine: Machine, fit: SavedFit, held: Mapping[str, float]) -> Propo
         found = [name for name in fit.estimates if name.startswith(f"{effect}.")]
         if not _of_the_machine(effect, machine):
             left_out[effect] = "no effect of the machine that is known here; never written"
+        elif fit.compensation is None and any(held[n] != 0.0 for n in held if n.startswith(effect)):
+            left_out[effect] = (
+                "the file does not say what the controller compensated when the run was taken; "
+                "use the model file of pkmcal fit --save"
+            )
         elif effect == "screw-cyclic":
             changes += _cyclic(fit, held, left_out)
         elif found and all(name in held for name in found):
-            changes += [_change(fit, name, held, held[name]) for name in found]
+            used = fit.compensation or {}
+            changes += [_change(fit, name, held, used.get(name, 0.0)) for name in found]
         else:
             left_out[effect] = "the controller has no compensation for it; its error stays"
     return Proposal(tuple(changes), left_out)
@@ -97,6 +103,10 @@ def _change(fit: SavedFit, name: str, held: Mapping[str, float], add_to: float) 
     return Change(name, held[name], new, found.sigma, found.unit, found.identified)
 
 
+def _change_to(name: str, held: Mapping[str, float], new: float, sigma: float, unit: str) -> Change:
+    return Change(name, held[name], new, sigma, unit, True)
+
+
 def _cyclic(fit: SavedFit, held: Mapping[str, float], left_out: dict[str, str]) -> list[Change]:
     """Turn A sin(2 pi s / p) + B cos(2 pi s / p) into the controller's table of each actuator."""
     effect = "screw-cyclic"
@@ -109,13 +119,20 @@ def _cyclic(fit: SavedFit, held: Mapping[str, float], left_out: dict[str, str]) 
         if period is None or not count:
             left_out[effect] = "the controller has no cyclic table"
             return []
-        if held[f"{table}.period"] != 0.0:
-            left_out[effect] = "the controller's cyclic table is in use; undo it first"
+        if (fit.compensation or {}).get(f"{table}.period", 0.0) != 0.0:
+            left_out[effect] = "the controller's cyclic table was in use meanwhile; undo it first"
             return []
         sine, cosine = (fit.estimates[f"{effect}.{leg}.{part}"] for part in ("sin", "cos"))
         sigma = math.hypot(sine.sigma, cosine.sigma)
         changes.append(
-            Change(f"{table}.period", 0.0, period.value, period.sigma, period.unit, True)
+            Change(
+                f"{table}.period",
+                held[f"{table}.period"],
+                period.value,
+                period.sigma,
+                period.unit,
+                True,
+            )
         )
         for k in range(count):
             turn = 2.0 * math.pi * k / count

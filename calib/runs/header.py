@@ -39,6 +39,8 @@ class Header:
     platform_nests: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     base_nests: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     controller_parameters: Mapping[str, float] = field(default_factory=dict)
+    compensation: Mapping[str, float] = field(default_factory=dict)
+    """What the controller compensated meanwhile, by its own names; missing is zero."""
     load: Load | None = None
 
 
@@ -93,6 +95,7 @@ def parse_header(
         platform_nests=platform,
         base_nests=base,
         controller_parameters=reader.controller_parameters(parameters),
+        compensation=reader.compensation(),
         load=reader.load(),
     )
 
@@ -173,6 +176,14 @@ class _Reader:
     def nests(self, body: str) -> dict[str, NDArray[np.float64]]:
         table = self.table(body, self.table("nests"))
         return {name: self.vector(name, value, "mm") for name, value in table.items()}
+
+    def compensation(self) -> dict[str, float]:
+        """``[controller.compensation]``: numbers by name."""
+        found = _flatten(self.table("compensation", self.table("controller")))
+        for name, value in found.items():
+            if not _is_number(value):
+                raise self.wrong(name, value, "a finite number")
+        return {name: float(value) for name, value in found.items()}
 
     def controller_parameters(self, known: Collection[str] | None) -> dict[str, float]:
         found = _flatten(self.table("parameters", self.table("controller")))

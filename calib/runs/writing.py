@@ -33,8 +33,9 @@ def _header_table(header: Header) -> dict[str, Any]:
         "platform": {name: p.tolist() for name, p in header.platform_nests.items()},
         "base": {name: p.tolist() for name, p in header.base_nests.items()},
     }
-    if header.controller_parameters:
-        table["controller"] = {"parameters": dict(header.controller_parameters)}
+    held = {"parameters": header.controller_parameters, "compensation": header.compensation}
+    if any(held.values()):
+        table["controller"] = {name: dict(values) for name, values in held.items() if values}
     if header.load is not None:
         table["load"] = {
             "gravity": header.load.gravity.tolist(),

@@ -8,10 +8,10 @@ import pytest
 from app.errors import GateRefused
 from app.files.fits import Estimate, SavedFit
 from app.files.machines import load_machine
-from app.verification import Summary
 from app.writeback.gates import Gates, gates_of_check, gates_of_proposal, refuse_if_any
 from app.writeback.proposal import propose
 from calib.errors import BadInput
+from calib.pose_error import Summary
 
 MACHINE = load_machine("hexapod")
 NOMINAL = {p.name: p.nominal for p in MACHINE.parameters}
@@ -84,12 +84,21 @@ def test_effects_of_the_measurement_are_never_written() -> None:
     assert proposal.values["backlash.leg6"] == 0.0  # lost motion is never negative
 
 
-def test_what_the_controller_compensates_already_is_added_to() -> None:
-    fit = made(("screw-pitch",), **{f"screw-pitch.leg{i}": 1e-4 for i in range(1, 7)})
-    held = {**HELD, "screw-pitch.leg2": 2e-4}
-    values = propose(MACHINE, fit, held).values
+def test_what_the_controller_compensated_meanwhile_is_added_to() -> None:
+    found = made(("screw-pitch",), **{f"screw-pitch.leg{i}": 1e-4 for i in range(1, 7)})
+    used = {"screw-pitch.leg2": 2e-4}
+    fit = replace(found, compensation=used)
+    values = propose(MACHINE, fit, {**HELD, **used}).values
     assert values["screw-pitch.leg1"] == 1e-4
     assert values["screw-pitch.leg2"] == pytest.approx(3e-4)
+    again = propose(MACHINE, fit, {**HELD, **values})
+    assert all(change.new == change.old for change in again.changes)
+
+
+def test_a_fit_that_is_silent_about_compensation_is_not_added() -> None:
+    fit = made(("screw-pitch",), **{f"screw-pitch.leg{i}": 1e-4 for i in range(1, 7)})
+    proposal = propose(MACHINE, fit, {**HELD, "screw-pitch.leg2": 2e-4})
+    assert "fit --save" in proposal.left_out["screw-pitch"]
 
 
 def test_a_cyclic_error_becomes_a_table() -> None:
