@@ -70,6 +70,8 @@ def main() -> None:
         diagnose_fit(found, effects, np.random.default_rng(1))
         times.append(time.perf_counter() - begin)
     print(f"{found.readings} readings, {len(effects)} effects: diagnosis {min(times):.2f} s")
+    if not options.null:
+        return
     rate = false_alarms(found, options.null)
     spread = np.sqrt(0.05 * 0.95 / options.null)
     print(f"false alarms {rate:.1%} of {options.null} (5 % +- {spread:.1%} wanted)")
