@@ -13,7 +13,8 @@ from calib.arrays import Numbers
 from calib.mechanism.closure import Closure, State
 from calib.mechanism.description import Kind, Machine
 from calib.mechanism.householder import Reflectors
-from calib.mechanism.solve import CHUNK, Configuration, platform_solver
+from calib.mechanism.newton import platform_solver
+from calib.mechanism.solve import CHUNK, Configuration
 
 
 @dataclass(frozen=True, eq=False)
