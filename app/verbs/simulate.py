@@ -9,6 +9,7 @@ import numpy as np
 from app import answer
 from app.files.poses import read_any_poses
 from app.files.runs import HEADER, POINTS
+from app.prototype import simulate_prototype
 from calib.errors import BadInput
 from calib.mechanism.rigid import Poses
 from calib.mechanism.task import task_values
@@ -23,7 +24,7 @@ FILE = click.Path(path_type=Path, dir_okay=False)
 
 
 @click.command()
-@click.argument("machine", type=click.Choice(list(BODIES)))
+@click.argument("machine")
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
@@ -56,9 +57,11 @@ FILE = click.Path(path_type=Path, dir_okay=False)
 def command(machine: str, out: Path, truth: Path | None, as_json: bool, **options: Any) -> None:
     """Write a simulated run of MACHINE, and apart from it the truth.
 
-    The physics is that of the mock machines and shares nothing with the model that is fitted. The
-    same seed gives the same run; changing the noise changes nothing else. FILE with poses is a
-    poses file or a CSV table.
+    For the hexapod, the tripod and the ptm the physics is that of the mock machines and shares
+    nothing with the model that is fitted. Any other machine, also one of your own, is a virtual
+    prototype: errors within its tolerances, solved exactly by the engine, without hidden effects.
+    The same seed gives the same run; changing the noise changes nothing else. FILE with poses is
+    a poses file or a CSV table.
     """
     if truth is not None and truth.parent.resolve() == out.resolve() and truth.name != "truth.json":
         raise BadInput(f"{truth} lies in the run's folder", remedy="Put the truth elsewhere")
@@ -69,17 +72,24 @@ def command(machine: str, out: Path, truth: Path | None, as_json: bool, **option
                 place=str(path),
                 remedy="Choose another folder",
             )
+    if machine not in BODIES:
+        report = simulate_prototype(machine, out, truth, options)
+        answer.show(report, as_json, _words(report))
+        return
     try:
         run = simulate(_plan(machine, **options))
     except (ValueError, ArithmeticError) as wrong:
         raise BadInput(str(wrong), remedy="Correct the options") from wrong
     write(run, out, truth)
     report = _report(run, out, truth or out / "truth.json")
-    words = (
-        f"{out}: {report['readings']} readings at {report['poses']} poses of a {machine}; "
-        f"the truth is in {report['truth']}"
+    answer.show(report, as_json, _words(report))
+
+
+def _words(report: dict[str, Any]) -> str:
+    return (
+        f"{report['run']}: {report['readings']} readings at {report['poses']} poses of "
+        f"{report['machine']}; the truth is in {report['truth']}"
     )
-    answer.show(report, as_json, words)
 
 
 def _plan(
