@@ -1,6 +1,6 @@
 """Cases of the blind trial: what is hidden, how large, and how it is measured."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,8 +13,14 @@ SIGMA_MM = 0.005
 LEGS = {
     "hexapod": tuple(f"leg{k}" for k in range(1, 7)),
     "tripod": tuple(f"limb{k}" for k in range(1, 4)),
+    "ptm": ("limb1", "limb2"),
 }
-NESTS = {"hexapod": ("3", "4", "5"), "tripod": ("p1", "p2", "p3")}
+NESTS = {
+    "hexapod": ("3", "4", "5"),
+    "tripod": ("p1", "p2", "p3"),
+    "ptm": ("p1", "p2", "p3"),
+}
+POSE_SETS = ("designed 29", "random 29", "random 60", "random 100")
 PROFILE = Profile(rise_K=6.0, payload_kg=(0.0, 12.0, 0.0, 12.0, 0.0, 12.0))
 
 Table = dict[str, float]
@@ -56,7 +62,8 @@ def _backlash(machine: str, rng: np.random.Generator) -> Table:
 
 
 def _cyclic(machine: str, rng: np.random.Generator) -> Table:
-    table = {"screw-cyclic.period": float(np.exp(rng.uniform(np.log(1.5), np.log(12.0))))}
+    low, high = (0.1, 6.28) if machine == "ptm" else (1.5, 12.0)  # rad, mm
+    table = {"screw-cyclic.period": float(np.exp(rng.uniform(np.log(low), np.log(high))))}
     for name, value in _legs("screw-cyclic", machine, rng).items():
         phase = rng.uniform(0.0, 2.0 * np.pi)
         table[f"{name}.sin"] = float(value * np.cos(phase))
@@ -98,6 +105,10 @@ def _settling(machine: str, rng: np.random.Generator) -> Table:
     return {"settling.k": float(rng.choice([-1.0, 1.0])), "settling.tau": float(rng.uniform(1, 4))}
 
 
+def _redundancy(machine: str, rng: np.random.Generator) -> Table:
+    return {"redundancy.limb": float(rng.integers(1, 5)), "redundancy.share": 1.0}
+
+
 def _one(name: str) -> Draw:
     return lambda machine, rng: {name: float(rng.choice([-1.0, 1.0]))}
 
@@ -123,6 +134,7 @@ EFFECTS: dict[str, Draw] = {
     "joint-tilt": _tilt,
     "nest-offset": _nest,
     "parallelogram-sides": _of_legs("parallelogram-sides"),
+    "redundancy": _redundancy,
     "screw-cyclic": _cyclic,
     "screw-pitch": _of_legs("screw-pitch"),
     "screw-twist": _one("screw-twist.L"),
@@ -142,25 +154,39 @@ UNKNOWN: dict[str, Draw] = {
     "unknown.wobble": _wobble,
 }
 ABSENT = {
-    "hexapod": {"joint-azimuth", "parallelogram-sides"},
+    "hexapod": {"joint-azimuth", "parallelogram-sides", "redundancy"},
+    "ptm": {
+        "joint-azimuth",
+        "joint-tilt",
+        "parallelogram-sides",
+        "screw-twist",
+        "unknown.bending",
+        "unknown.soft-legs",
+    },
     "tripod": {
         "joint-tilt",
+        "redundancy",
         "screw-twist",
         "unknown.bending",
         "unknown.soft-legs",
         "unknown.platform-flex",  # its platform does not tilt
     },
 }
-FIXED = ("period", "tau", "t0", "where")
+FIXED = ("period", "tau", "t0", "where", "limb")
 """Numbers that are no amplitudes: they keep their values when a case is scaled."""
 TRIAL_MM = 0.01
 TRIAL = {
     "gravity-sag": 1e-4, "thermal-growth": 1e-5, "screw-pitch": 1e-3, "screw-twist": 1.0,
     "settling": 1e-3, "joint-azimuth": 1e-4, "tracker-scale": 1e-5, "joint-tilt": 2e-3,
     "unknown.screw-quadratic": 1e-5, "unknown.bending": 1e-3, "unknown.soft-legs": 1e-6,
-    "unknown.platform-flex": 1e-2,
+    "unknown.platform-flex": 1e-2, "redundancy": 0.1,
 }  # fmt: skip
 """Amplitude of a first trial in the effect's own unit, before it is scaled to a size."""
+TRIAL_ROTARY = {
+    "backlash": 1e-5, "screw-cyclic": 1e-5, "screw-pitch": 1e-5, "settling": 1e-5,
+    "gravity-sag": 1e-9, "unknown.screw-quadratic": 1e-5, "unknown.hysteresis": 1e-5,
+}  # fmt: skip
+"""The same where actuators turn: rad, rad/rad, rad/(N mm), 1/rad."""
 
 
 def _plan(case: Case, poses: object) -> RunPlan:
@@ -193,15 +219,19 @@ def _scaled(
     span = float(empty.layout.time[-1])
     if "frame-shift.t0" in table:
         table["frame-shift.t0"] *= span
-    trial = TRIAL.get(name, TRIAL_MM)
+    own = TRIAL_ROTARY if plan.machine == "ptm" else {}
+    trial = own.get(name, TRIAL.get(name, TRIAL_MM))
     amplitude = [key for key in table if key.rpartition(".")[2] not in FIXED]
     table |= {key: table[key] * trial for key in amplitude}
-    for _ in range(3):
+    bent = 0.5 if name == "redundancy" else 1.0  # a limb that softens is not linear in its share
+    for _ in range(16 if name == "redundancy" else 3):
         seen = simulate(replace(plan, hidden=Hidden(table)))
         moved = (seen.xyz - empty.xyz)[empty.layout.reading]
         rms = float(np.sqrt(np.mean(np.sum(moved**2, axis=1))))
         factor = size * np.sqrt(3.0) * SIGMA_MM / rms
-        table |= {key: table[key] * factor for key in amplitude}
+        table |= {key: table[key] * factor**bent for key in amplitude}
+        if "redundancy.share" in table:
+            table["redundancy.share"] = min(table["redundancy.share"], 1.0)
         if abs(factor - 1.0) < 0.02:
             break
     return table
@@ -215,29 +245,67 @@ def displaced(case: Case, poses: object, hidden: Table) -> np.ndarray:
     return np.asarray(moved.T)
 
 
-def draw_cases(count: int, seed: int, pose_sets: Sequence[str], machine: str) -> list[Case]:
-    """Equal shares over the catalogue at several sizes, pairs, triples, none and unknown ones."""
-    rng = np.random.default_rng(seed)
+def build_follow_up(
+    first: SimulatedRun, hidden: Table, poses: np.ndarray, conditions: Mapping[str, float]
+) -> SimulatedRun:
+    """Simulate a second run of the same machine on another day, in another frame.
+
+    A step of the frame happened in the first run and is not in this one; everything else is.
+    """
+    left = {name: value for name, value in hidden.items() if not name.startswith("frame-shift")}
+    channels = first.channels
+    profile = Profile(
+        start_C=conditions.get("structure_temp_C", float(channels["structure_temp_C"][-1])),
+        rise_K=0.0,
+        payload_kg=(conditions.get("payload_kg", float(channels["payload_kg"][-1])),),
+    )
+    plan = replace(
+        first.plan,
+        seed=first.plan.seed + 5_000_000,
+        poses=poses,
+        parameters=first.parameters,
+        profile=profile,
+        hidden=Hidden(left),
+        delays=first.plan.delays or first.plan.hidden.has("settling."),
+    )
+    return simulate(plan)
+
+
+def draw_cases(count: int, seed: int, machine: str) -> list[Case]:
+    """Equal shares over the catalogue at several sizes, pairs, triples, and unknown ones.
+
+    Every effect comes as often as any other; the set of poses is drawn for each case. Half of the
+    single effects of size 1 are measured at 29 designed poses.
+    """
+    rng = np.random.default_rng([seed, len(machine)])
     absent = ABSENT[machine]
     names, unknown = sorted(EFFECTS.keys() - absent), sorted(UNKNOWN.keys() - absent)
     cases = []
     for number in range(count):
-        poses = pose_sets[number % len(pose_sets)]
-        kind = number % 10
-        at = 1000 * seed + number
-        if kind < 5:
-            effect = names[(number // 10 * 5 + kind) % len(names)]
-            size = (1.0, 1.0, 2.0, 0.5, 4.0)[kind]
+        kind, turn = number % 10, number // 10
+        poses = str(rng.choice(POSE_SETS))
+        at = 100_000 * seed + number
+        if kind < 6:
+            effect = names[(turn * 6 + kind) % len(names)]
+            size = (1.0, 1.0, 1.0, 2.0, 0.5, 4.0)[(kind + turn * 6 // len(names)) % 6]
+            if size == 1.0 and rng.random() < 0.5:
+                poses = POSE_SETS[0]
             cases.append(Case(at, (effect,), (size,), poses, machine=machine))
-        elif kind < 7:
+        elif kind < 8:
             two = tuple(map(str, rng.choice(names, 2, replace=False)))
             cases.append(Case(at, two, (2.0, 2.0), poses, machine=machine))
-        elif kind == 7:
+        elif kind == 8:
             three = tuple(map(str, rng.choice(names, 3, replace=False)))
             cases.append(Case(at, three, (2.0, 2.0, 2.0), poses, machine=machine))
-        elif kind == 8:
-            cases.append(Case(at, (), (), poses, machine=machine))
         else:
-            effect = unknown[number // 10 % len(unknown)]
+            effect = unknown[turn % len(unknown)]
             cases.append(Case(at, (effect,), (2.0,), poses, unknown=True, machine=machine))
     return cases
+
+
+def draw_nulls(count: int, seed: int, machine: str) -> list[Case]:
+    """Runs in which nothing is hidden, the four sets of poses in turn."""
+    return [
+        Case(100_000 * seed + 50_000 + k, (), (), POSE_SETS[k % 4], machine=machine)
+        for k in range(count)
+    ]

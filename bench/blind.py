@@ -20,24 +20,28 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from app.files.machines import load_machine
-from bench._blind_cases import SIGMA_MM, Case, build, displaced, draw_cases
+from bench._blind_cases import SIGMA_MM, Case, build, draw_cases, draw_nulls
+from bench._blind_follow_up import follow_up
+from bench._blind_judge import Foreseen, foreseen, pulls
 from bench._blind_page import page
-from calib.discover.pairs import power
-from calib.discover.run_discovery import Refitter, RunStage, discover_run, stage_of
+from calib.discover.run_discovery import Refitter, discover_run, stage_of
 from calib.effects import catalogue
 from calib.errors import BadInput
+from calib.mechanism.description import Machine
 from calib.poses.design import design_poses
 from calib.poses.readings import NestReadings
 from calib.runs import parse_header, parse_run
-from calib.runs.stack import Rows, stack
+from calib.runs.stack import stack
 from mocks.simulate.files import points_csv, run_toml
-
-POSE_SETS = ("designed 29", "random 29", "random 60", "random 100")
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What was found in one case, beside the truth."""
+    """What was found in one case, beside the truth.
+
+    ``foreseen`` one for each hidden effect, in a model that has the others; ``after`` the first
+    effect and the groups after a designed follow-up, where there was one.
+    """
 
     case: Case
     adequate: bool
@@ -48,16 +52,21 @@ class Outcome:
     holdout_over_floor: float
     holdout_rose: bool
     pulls: tuple[float, ...] = ()
-    predicted_power: float = float("nan")
-    detected: bool = False
-    likeness: float = float("nan")
+    foreseen: tuple[Foreseen, ...] = ()
+    after: tuple[str | None, tuple[tuple[str, ...], ...]] | None = None
     bad: int = 0
     seconds: float = 0.0
     hidden: dict[str, float] = field(default_factory=dict)
     failure: str = ""
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=3)
+def machine_named(name: str) -> Machine:
+    """A shipped machine, loaded once."""
+    return load_machine(name)
+
+
+@lru_cache(maxsize=9)
 def designed(machine: str, number: int) -> np.ndarray:
     """29 poses chosen for predicted pose error, (29, k) in the machine's task coordinates."""
     empty, _ = build(Case(0, (), (), "", machine=machine), 4)
@@ -68,7 +77,7 @@ def designed(machine: str, number: int) -> np.ndarray:
         np.array(list(header.base_nests.values())).T,
     )
     generator = np.random.default_rng(number)
-    chosen = design_poses(load_machine(machine), readings, 29, generator, counts=())
+    chosen = design_poses(machine_named(machine), readings, 29, generator, counts=())
     return np.asarray(chosen.pose_set.task.T)
 
 
@@ -81,18 +90,19 @@ def poses_of(case: Case) -> object:
 def solve(case: Case) -> Outcome:
     """Simulate, discover, compare."""
     poses = poses_of(case)
-    simulated, hidden = build(case, poses)
-    machine = load_machine(case.machine)
-    actuators = len(machine.actuators)
-    run = parse_run(run_toml(simulated), points_csv(simulated), actuators=actuators)
-    rows = stack(machine, [run])
     begin = time.perf_counter()
+    simulated, hidden = build(case, poses)
+    machine = machine_named(case.machine)
+    run = parse_run(run_toml(simulated), points_csv(simulated), actuators=len(machine.actuators))
+    rows = stack(machine, [run])
     refit = Refitter(rows, catalogue(machine))
     found = discover_run(refit)
     seconds = time.perf_counter() - begin
     first, last = stage_of(found, 0), stage_of(found)
     held = [stage_of(found, k).holdout for k in range(len(found.steps))]
-    predicted, detected, likeness = _foreseen(case, poses, hidden, first)
+    after = None
+    if case.kind == "single" and case.sizes == (1.0,) and case.poses.startswith("designed"):
+        after = follow_up(refit, found, simulated, hidden)
     return Outcome(
         case=case,
         adequate=first.diagnosis.adequate,
@@ -102,60 +112,26 @@ def solve(case: Case) -> Outcome:
         unexplained=last.diagnosis.unexplained.significant,
         holdout_over_floor=last.run.holdout.rms_mm / last.run.holdout.floor_mm,
         holdout_rose=bool(np.any(np.diff(held) > 1e-9)),
-        pulls=_pulls(rows, hidden, last),
-        predicted_power=predicted,
-        detected=detected,
-        likeness=likeness,
+        pulls=pulls(rows, hidden, last),
+        foreseen=_foreseen(case, poses, hidden, refit),
+        after=after,
         bad=len(last.run.fit.bad),
         seconds=seconds,
         hidden=hidden,
     )
 
 
-def _pulls(rows: Rows, hidden: dict[str, float], last: RunStage) -> tuple[float, ...]:
-    """(estimate - truth) / sigma of the hidden effects' unknowns where the right ones are found."""
-    truly = {name.split(".")[0] for name in hidden}
-    if set(last.effects) != truly:
-        return ()
-    fit = last.run.fit
-    values = dict(zip(fit.model.names, zip(fit.values, fit.sigmas, strict=True), strict=True))
-    unknowns = [u for group in fit.model.unknowns for u in group if not u.nonlinear]
-    return tuple(
-        (values[u.name][0] - hidden.get(u.name, 0.0)) / values[u.name][1]
-        for u in unknowns
-        if u.sigma is None and not u.name.startswith("frame-shift")
-    )
-
-
 def _foreseen(
-    case: Case, poses: object, hidden: dict[str, float], first: RunStage
-) -> tuple[float, bool, float]:
-    """Predicted power and detection of a single effect; likeness of an unknown one to the known."""
-    if len(case.effects) != 1:
-        return float("nan"), False, float("nan")
-    fit, diagnosis = first.run.fit, first.diagnosis
-    moved = displaced(case, poses, hidden)
-    whitened = np.einsum("ijn,jn->in", fit.model.rows.whitener, moved)
-    signature = whitened[:, fit.accepted].reshape(-1)
-    scores = diagnosis.scores
-    left = scores.problem.project(signature)
-    norm = float(signature @ left)
-    likeness, predicted = 0.0, []
-    for index, candidate in enumerate(scores.candidates):
-        if case.unknown and candidate.channel:
-            predicted.append(power(scores, diagnosis.family, index, signature))
-        if candidate.channel:
-            continue
-        if not case.unknown and candidate.name == case.effects[0]:
-            predicted.append(power(scores, diagnosis.family, index, signature))
-        overlap = candidate.columns @ left
-        for trial, weighing in enumerate(scores.weighings[index][0].whiten):
-            unit = overlap[trial] / np.maximum(scores.norms[index][trial], 1e-300)
-            likeness = max(likeness, float(np.sum((weighing @ unit) ** 2)) / norm)
-    findings = {finding.name: finding for finding in diagnosis.findings}
-    known = findings.get(case.effects[0])
-    detected = known is not None and known.p_value <= 0.05
-    return max(predicted, default=float("nan")), detected, float(np.sqrt(likeness))
+    case: Case, poses: object, hidden: dict[str, float], refit: Refitter
+) -> tuple[Foreseen, ...]:
+    """Every effect of a single or a pair, in the model that has the other."""
+    if len(case.effects) > 2:
+        return ()
+    found = []
+    for effect in case.effects:
+        others = tuple(other for other in case.effects if other != effect)
+        found.append(foreseen(case, poses, hidden, effect, refit(others)))
+    return tuple(found)
 
 
 def attempt(case: Case) -> Outcome:
@@ -180,7 +156,7 @@ def main() -> None:
     parser.add_argument("--null", type=int, default=400)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--machines", default="hexapod,tripod")
+    parser.add_argument("--machines", default="hexapod,tripod,ptm")
     parser.add_argument("--only", choices=("single", "several", "unknown"))
     parser.add_argument("--page", type=Path)
     options = parser.parse_args()
@@ -190,13 +166,10 @@ def main() -> None:
         begin = time.perf_counter()
         cases = [
             case
-            for case in draw_cases(options.cases, options.seed, POSE_SETS, machine)
+            for case in draw_cases(options.cases, options.seed, machine)
             if options.only is None or options.only == case.kind
         ]
-        nulls = [
-            Case(500_000 + 1000 * options.seed + k, (), (), POSE_SETS[k % 4], machine=machine)
-            for k in range(options.null)
-        ]
+        nulls = draw_nulls(options.null, options.seed, machine)
         outcomes = run_all([*cases, *nulls], options.workers)
         text += "\n" + page(outcomes, machine, time.perf_counter() - begin)
     print(text)

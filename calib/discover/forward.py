@@ -7,6 +7,7 @@ called for beside the others: one that a later effect has made superfluous is ta
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from calib.discover.diagnosis import ALPHA
 from calib.discover.findings import Diagnosis
@@ -19,16 +20,24 @@ BY_CHANCE = 0.02
 """Relative change of the hold-out error by an unknown that is of no use, either way."""
 
 
-@dataclass(frozen=True)
-class Stage:
-    """A refitted model and what is missing from it.
+class Stage(Protocol):
+    """A refitted model and what is missing from it; the diagnosis may be made when asked for."""
 
-    ``holdout`` is the RMS over held-out poses; ``diagnosis`` that of the refitted model.
-    """
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Effects in the model."""
 
-    effects: tuple[str, ...]
-    holdout: float
-    diagnosis: Diagnosis
+    @property
+    def holdout(self) -> float:
+        """RMS over held-out poses."""
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """What is missing from the refitted model."""
+
+    @property
+    def doubtful(self) -> frozenset[str]:
+        """Effects in the model that might as well not be: only these need to be tried without."""
 
 
 @dataclass(frozen=True)
@@ -113,10 +122,10 @@ def _superfluous(
     before = taken[-2].stage.holdout if len(taken) > 1 else float("inf")
     for name in taken[-1].stage.effects:
         now = steps[-1].stage if steps else taken[-1].stage
-        if name in keep or len(now.effects) < 2:
+        if name in keep or len(now.effects) < 2 or name not in now.doubtful:
             continue
         without = refit(tuple(other for other in now.effects if other != name))
         limit = min(now.holdout * (1.0 + BY_CHANCE), before)
-        if without.diagnosis.adequate and without.holdout <= limit:
+        if without.holdout <= limit and without.diagnosis.adequate:
             steps.append(Step(without, removed=name))
     return steps

@@ -2,25 +2,63 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from calib.discover.forward import Discovery, Stage, discover
+from calib.discover.findings import Diagnosis
+from calib.discover.forward import Discovery, discover
 from calib.discover.run_diagnosis import RunDiagnosis, diagnose_fit, fit_effects
+from calib.discover.tails import log_tail
 from calib.effects.component import Effect
 from calib.errors import BadInput
 from calib.identify.fitting import Fit
+from calib.identify.holdout import hold_out
 from calib.runs.stack import Rows
 
 SEED = 20_260_801
 """The null draws are the same every time: the same run gets the same answer."""
 
 
-@dataclass(frozen=True)
-class RunStage(Stage):
-    """A stage of the staircase with its fit."""
+BEYOND_DOUBT = -14.0
+"""log p from which an effect's own estimate says that it is there, whatever else is in."""
 
-    run: RunDiagnosis
+
+@dataclass(frozen=True, eq=False)
+class RunStage:
+    """A stage of the staircase with its fit; it is diagnosed when first asked."""
+
+    effects: tuple[str, ...]
+    holdout: float
+    fit: Fit
+    examine: Callable[[Fit], RunDiagnosis]
+
+    @cached_property
+    def run(self) -> RunDiagnosis:
+        """The diagnosis with its fit and the signatures of the candidates."""
+        return self.examine(self.fit)
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """What is missing from the model."""
+        return self.run.diagnosis
+
+    @property
+    def doubtful(self) -> frozenset[str]:
+        """Effects whose estimates are not far from nothing for their uncertainty (Wald's test)."""
+        model = self.fit.model
+        first, found = model.free.size, []
+        for effect, group in zip(model.effects, model.unknowns, strict=True):
+            which = first + np.flatnonzero([not unknown.nonlinear for unknown in group])
+            first += len(group)
+            sigma = self.fit.sigmas[which]
+            distance = (self.fit.values[which] - model.centre[which]) / sigma
+            alike = self.fit.covariance[np.ix_(which, which)] / sigma / sigma[:, None]
+            chi2 = np.array([distance @ np.linalg.solve(alike, distance)])
+            chi2 /= max(1.0, self.fit.chi2_per_dof)
+            if log_tail(chi2, which.size)[0] > BEYOND_DOUBT:
+                found.append(effect.id)
+        return frozenset(found)
 
 
 class Refitter:
@@ -57,17 +95,18 @@ class Refitter:
             if self._watch is not None:
                 self._watch(names)
             try:
-                self.fit(names)
+                fitted = self.fit(names)
             except BadInput:
                 if not self._stages:
                     raise
                 first = next(iter(self._stages.values()))
                 return replace(first, effects=names, holdout=float("inf"))
-            found = diagnose_fit(
-                self.fit(names), tuple(self.effects.values()), np.random.default_rng(self._seed)
-            )
-            self._stages[names] = RunStage(names, found.holdout.rms_mm, found.diagnosis, found)
+            self._stages[names] = RunStage(names, hold_out(fitted).rms_mm, fitted, self._examine)
         return self._stages[names]
+
+    def _examine(self, fitted: Fit) -> RunDiagnosis:
+        known = tuple(self.effects.values())
+        return diagnose_fit(fitted, known, np.random.default_rng(self._seed))
 
     def _effect(self, name: str) -> Effect:
         try:

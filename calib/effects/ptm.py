@@ -9,8 +9,8 @@ from calib.arrays import Array
 from calib.effects.component import Effect, Signature, Situation, Unknown
 from calib.effects.thermal_growth import REFERENCE_C, ThermalGrowth
 from calib.mechanism.description import Limb, Machine
-from calib.mechanism.rigid import small_rotation
-from calib.mechanism.solve import forward
+from calib.mechanism.rigid import Poses, small_rotation
+from calib.mechanism.solve import begun_at, forward
 from calib.mechanism.variants import closure_names, with_closure
 from calib.runs.stack import Rows
 
@@ -98,12 +98,24 @@ class Redundancy(Effect):
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """From the pose with all constraints to the pose without one, same parameters."""
-        machine, s, held = situation.machine, situation.closed.extension, situation.parameters
-        tight = forward(machine, s, held).poses
-        loose = forward(_without(machine, round(float(values[1]))), s, held).poses
+        machine = situation.machine
+        tight = _closed_as(machine, situation)
+        loose = _closed_as(_without(machine, round(float(values[1]))), situation)
         turned = small_rotation(tight.rotation, loose.rotation)
         twist = np.concatenate([loose.position - tight.position, turned])[:, situation.state_of]
         return Signature(twist=np.stack([twist, np.zeros_like(twist)]))
+
+
+def _closed_as(machine: Machine, situation: Situation) -> Poses:
+    """Where another closure of the machine holds the platform, beginning at where it is now.
+
+    Released from home a limb may close in another assembly.
+    """
+    closed = situation.closed
+    if situation.closing is machine:
+        return closed.poses
+    start = begun_at(machine, closed)
+    return forward(machine, closed.extension, situation.parameters, start).poses
 
 
 @lru_cache(maxsize=16)

@@ -5,6 +5,7 @@ coordinates. Both take one parameter vector, or one for each pose; both carry th
 :class:`Configuration`, which starts the next solution nearby.
 """
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -19,7 +20,15 @@ from calib.mechanism.newton import MAX_STEP, Newton, run
 from calib.mechanism.rigid import Poses, from_euler
 from calib.mechanism.task import task_values
 
-__all__ = ["CHUNK", "Configuration", "forward", "home_configuration", "inverse", "settle_limbs"]
+__all__ = [
+    "CHUNK",
+    "Configuration",
+    "begun_at",
+    "forward",
+    "home_configuration",
+    "inverse",
+    "settle_limbs",
+]
 
 CHUNK = 1024
 """Poses solved together: small enough that the working set stays in the cache."""
@@ -111,6 +120,20 @@ def _state_from(
         spread(start.passive),
         [spread(e) for e in start.strain],
     )
+
+
+def begun_at(machine: Machine, at: Configuration) -> Configuration:
+    """Start for another closure of the same limbs: pose and joints as they are, nothing strained.
+
+    Parameters
+    ----------
+    machine : Machine
+        With the joints of the machine that was closed; other limbs may be rigid or released.
+    at : Configuration of N poses
+    """
+    groups = compile_machine(machine).groups
+    strain = tuple(np.zeros((len(g.compliant), g.count, at.count)) for g in groups)
+    return replace(at, strain=strain)
 
 
 def _columns(parameters: Numbers | None, machine: Machine) -> Numbers:

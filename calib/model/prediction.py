@@ -22,7 +22,7 @@ from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.rigid import cross, exponential, product, rotate
-from calib.mechanism.solve import Configuration, forward, home_configuration
+from calib.mechanism.solve import Configuration, begun_at, forward, home_configuration
 from calib.model.columns import (
     apply,
     apply_each,
@@ -293,8 +293,8 @@ class Model:
     def _closed(
         self, extension: Array, parameters: Array, start: Configuration | None, machine: Machine
     ) -> Configuration:
-        if start is not None and not _of_these_states(start, extension, machine):
-            start = None
+        if start is not None:
+            start = _carried(start, extension, machine)
         closed = forward(machine, extension, parameters, start)
         if not closed.converged.all():
             state = int(np.argmin(closed.converged))
@@ -369,8 +369,17 @@ class Model:
         return deviation
 
 
-def _of_these_states(start: Configuration, extension: Array, machine: Machine) -> bool:
-    """Whether a configuration can begin this closure: a model with other effects has others."""
-    like = home_configuration(machine).strain
-    shapes = [strain.shape[:2] for strain in start.strain] == [one.shape[:2] for one in like]
-    return shapes and start.count == extension.shape[1]
+def _carried(start: Configuration, extension: Array, machine: Machine) -> Configuration | None:
+    """A configuration that can begin this closure; None for one of other states.
+
+    A model with other effects may have other states; a closure with other elastic parts begins
+    unstrained where the platform is.
+    """
+    if start.count != extension.shape[1]:
+        return None
+    like = home_configuration(machine)
+    if start.passive.shape[0] != like.passive.shape[0]:
+        return None
+    if [one.shape[:2] for one in start.strain] == [one.shape[:2] for one in like.strain]:
+        return start
+    return begun_at(machine, start)

@@ -1,11 +1,36 @@
 """A small machine-like problem with known truth: smooth geometry, frames, effects, structure."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from calib.discover import Candidate, Carrier, LinearProblem, Term, Variable, structure_candidates
+from calib.discover import (
+    Candidate,
+    Carrier,
+    Diagnosis,
+    LinearProblem,
+    Term,
+    Variable,
+    structure_candidates,
+)
 from calib.discover.quadratic import Neighbours
 
 POSES = 45
+
+
+@dataclass(frozen=True)
+class Refitted:
+    """A stage of the staircase that is all there from the start; any effect may be tried out."""
+
+    effects: tuple
+    holdout: float
+    diagnosis: Diagnosis
+
+    @property
+    def doubtful(self):
+        return frozenset(self.effects)
+
+
 PRIOR = 0.5
 
 

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from discover_synthetic import Lab
+from discover_synthetic import Lab, Refitted
 
-from calib.discover import Stage, diagnose, discover
+from calib.discover import diagnose, discover
 
 
 class Refit:
@@ -29,7 +29,7 @@ class Refit:
         found = diagnose(
             problem, others, self.lab.structure, rng=np.random.default_rng(1), draws=199
         )
-        return Stage(names, float(np.sqrt(np.mean(left_out**2))), found)
+        return Refitted(names, float(np.sqrt(np.mean(left_out**2))), found)
 
 
 def hidden(lab, **amplitudes):
@@ -71,7 +71,7 @@ def test_effect_that_makes_the_holdout_rise_is_refused():
     def pessimist(names):
         stage = refit(names)
         worse = 5.0 if "backlash" in names else 1.0
-        return Stage(stage.effects, worse * stage.holdout, stage.diagnosis)
+        return Refitted(stage.effects, worse * stage.holdout, stage.diagnosis)
 
     found = discover(pessimist)
     assert "backlash" in found.refused
@@ -91,7 +91,7 @@ def test_effect_made_superfluous_is_taken_out():
         stage = refit(names)
         if names:
             return stage
-        return Stage((), stage.holdout, misleading(stage.diagnosis))
+        return Refitted((), stage.holdout, misleading(stage.diagnosis))
 
     def misleading(diagnosis):
         return replace(diagnosis, explained_by=("heat-twin",))

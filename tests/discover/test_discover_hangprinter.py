@@ -3,8 +3,9 @@
 import discover_hangprinter as hp
 import numpy as np
 import pytest
+from discover_synthetic import Refitted
 
-from calib.discover import Stage, diagnose, discover
+from calib.discover import diagnose, discover
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +62,7 @@ def test_discovery_stops_after_the_buildup(machine, linear_spool, with_buildup):
         seen = free > 1e-6  # a line without which its pose is not determined predicts nothing
         left_out = problem.residual[seen] / free[seen]
         found = diagnosis(machine, fitted, "buildup" in effects)
-        return Stage(effects, float(np.sqrt(np.mean(left_out**2))), found)
+        return Refitted(effects, float(np.sqrt(np.mean(left_out**2))), found)
 
     found = discover(refit)
     assert [step.added for step in found.steps] == [None, "buildup"]
