@@ -27,7 +27,9 @@ STRUCTURE_SHARE = 0.05
 IN_QUESTION = 7.0
 """Candidates whose evidence is less than e^7 below the best are still in question."""
 UNKNOWN_MARGIN = 10.0
-"""Structure of unknown origin must beat the effects' evidence by e^10 to be preferred."""
+"""Structure of unknown origin must beat the effects' evidence by e^10 to be preferred,"""
+UNKNOWN_SHARE = 0.1
+"""and by this part of it: a scan meets no period exactly, at a cost that grows with the effect."""
 MOST_EFFECTS = 6
 
 
@@ -83,7 +85,8 @@ def diagnose(
     left = _unexplained(last, quadratic, alpha)
     before = _unexplained(first, quadratic, alpha)
     unknown = max((d.log_evidence for d in before.dependences), default=0.0)
-    preferred = unknown > sum(value for _, value in chosen) + UNKNOWN_MARGIN
+    explained = sum(value for _, value in chosen)
+    preferred = unknown > (1.0 + UNKNOWN_SHARE) * max(explained, 0.0) + UNKNOWN_MARGIN
     if preferred and not left.significant:
         left = before
     return Diagnosis(

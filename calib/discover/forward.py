@@ -1,7 +1,8 @@
 """Add the missing effects one by one: diagnose, add the best, refit, and see the error fall.
 
-An effect is accepted only if held-out poses are predicted no worse with it than without; one that
-is refused is not offered again, and the next is tried. In the end every effect must still be
+An effect is accepted only if held-out poses are predicted no worse with it than without; where
+one is refused the next is tried, and it may come back once another has been accepted: alone, with
+what else is missing, it may be drawn away from its value. In the end every effect must still be
 called for beside the others: one that a later effect has made superfluous is taken out.
 """
 
@@ -51,7 +52,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Discovery:
-    """The staircase: accepted steps, effects that were refused, and groups seen on the way."""
+    """The staircase: accepted steps, effects refused in the end, and groups seen on the way."""
 
     steps: tuple[Step, ...]
     refused: tuple[str, ...]
@@ -94,6 +95,7 @@ def discover(
             continue
         groups += [group for group in now.diagnosis.indistinguishable if group not in groups]
         steps.append(Step(tried, added=added))
+        refused = []
     steps += _superfluous(refit, steps, frozenset((*begin, *keep)))
     last = steps[-1].stage.effects
     here = [group for group in groups if set(group) & set(last)]
@@ -101,14 +103,17 @@ def discover(
 
 
 def _next(stage: Stage, refused: Sequence[str]) -> str | None:
-    """Name the best effect that is called for and has not been refused."""
+    """Name the best effect that is called for and has not been refused.
+
+    First those that explain the residual one after the other: the second may be significant only
+    beside the first.
+    """
     diagnosis = stage.diagnosis
     if diagnosis.unknown_preferred or not diagnosis.explained_by:
         return None
-    if diagnosis.explained_by[0] not in refused:
-        return diagnosis.explained_by[0]
-    significant = [found for found in diagnosis.findings if found.p_value <= ALPHA]
-    return next((found.name for found in significant if found.name not in refused), None)
+    significant = [found.name for found in diagnosis.findings if found.p_value <= ALPHA]
+    offered = (*diagnosis.explained_by, *significant)
+    return next((name for name in offered if name not in refused), None)
 
 
 def _superfluous(

@@ -108,3 +108,18 @@ def test_answer_is_the_same_each_time(seed):
     answers = [discover(Refit(lab, hidden(lab, drift=4.0), seed)) for _ in "ab"]
     assert answers[0].last.effects == answers[1].last.effects
     assert answers[0].last.holdout == answers[1].last.holdout
+
+
+def test_refused_effect_comes_back_once_another_is_in():
+    lab = Lab(21)
+    refit = Refit(lab, hidden(lab, backlash=3.0, pitch=8.0), 1)
+    first = refit(()).diagnosis.explained_by[0]
+
+    def pessimist(names):
+        stage = refit(names)
+        return Refitted(names, stage.holdout * (9.0 if names == (first,) else 1.0), stage.diagnosis)
+
+    found = discover(pessimist)
+    assert {first} < set(found.last.effects)
+    assert found.last.effects[0] != first
+    assert found.refused == ()
