@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from calib.arrays import Array, BoolArray
+from calib.arrays import Array, BoolArray, IntArray
 from calib.discover.problem import LinearProblem
 
 
@@ -76,6 +76,15 @@ class Candidate:
         """The whole group first, then every subset that is smaller."""
         whole = tuple(range(len(self.terms)))
         return (whole, *(subset for subset in dict.fromkeys(self.subsets) if subset != whole))
+
+    @cached_property
+    def by_count(self) -> tuple[IntArray, ...]:
+        """Hypotheses (H, k) by their number k of unknowns, the whole group first."""
+        counts = dict.fromkeys(len(subset) for subset in self.hypotheses)
+        return tuple(
+            np.array([one for one in self.hypotheses if len(one) == count], dtype=np.intp)
+            for count in counts
+        )
 
 
 def alone(terms: tuple[Term, ...]) -> tuple[tuple[int, ...], ...]:

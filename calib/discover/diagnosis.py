@@ -22,6 +22,9 @@ from calib.discover.scores import Scores, chi_squares, score
 
 ALPHA = 0.05
 DRAWS = 399
+FIRST_DRAWS = 99
+CLEAR = (0.1, 4.0)
+"""Parts of alpha: p-values below and above are decided by the first draws, all others by all."""
 STRUCTURE_SHARE = 0.05
 """Part of the false alarms that structure of unknown origin may cause; effects have the rest."""
 IN_QUESTION = 7.0
@@ -77,11 +80,15 @@ def diagnose(
     alpha : float
         Family-wise false alarm.
     """
-    scores = score(problem, [*effects, *structure], rng, draws)
-    first = _judge(scores, len(effects), quadratic)
+    first_draws = min(FIRST_DRAWS, draws)
+    scores = score(problem, [*effects, *structure], rng, first_draws)
+    found = _explore(scores, len(effects), quadratic, alpha, rng)
+    if draws > first_draws and found.close(alpha):
+        scores = scores.with_more(draws - first_draws, rng)
+        found = _explore(scores, len(effects), quadratic, alpha, rng)
+    first, last, chosen = found.rounds[0], found.rounds[-1], found.chosen
     order, evidences = _ranked(first)
     findings = {index: _finding(first, index, evidences[index]) for index in order}
-    chosen, groups, last = _explain(first, quadratic, alpha, rng)
     left = _unexplained(last, quadratic, alpha)
     before = _unexplained(first, quadratic, alpha)
     unknown = max((d.log_evidence for d in before.dependences), default=0.0)
@@ -93,7 +100,8 @@ def diagnose(
         findings=tuple(findings[index] for index in order),
         explained_by=tuple(scores.candidates[index].name for index, _ in chosen),
         indistinguishable=tuple(
-            tuple(scores.candidates[index].name for index in group) for group in groups
+            tuple(scores.candidates[index].name for index in group)
+            for group in _groups(found, alpha)
         ),
         unexplained=left,
         unknown_preferred=preferred,
@@ -119,29 +127,63 @@ def _ranked(judged: _Round) -> tuple[list[int], dict[int, float]]:
     return sorted(judged.effects, key=lambda index: -evidences[index]), evidences
 
 
-def _explain(
-    judged: _Round, quadratic: Sequence[Quadratic], alpha: float, rng: np.random.Generator
-) -> tuple[list[tuple[int, float]], list[tuple[int, ...]], _Round]:
-    """Add significant effects one by one; returns them with their evidence, groups, the end."""
+@dataclass(frozen=True, eq=False)
+class _Explored:
+    """Rounds of the linearised fit, and the effect with its evidence that ended each but the last.
+
+    Effects are ``chosen`` one by one, the most evidence of the significant ones first.
+    """
+
+    rounds: tuple[_Round, ...]
+    chosen: tuple[tuple[int, float], ...]
+
+    def close(self, alpha: float) -> bool:
+        """Whether any decision is so close that it takes more null draws."""
+        decisive = [judged.log_p(index) for judged, (index, _) in self.pairs()]
+        last = self.rounds[-1]
+        decisive.append(last.log_p(int(np.argmax(last.family.strengths[:, 0]))))
+        low, high = np.log(alpha) + np.log(CLEAR)
+        return any(low < log_p < high for log_p in decisive)
+
+    def pairs(self) -> list[tuple[_Round, tuple[int, float]]]:
+        """Every round that chose, with what it chose."""
+        return list(zip(self.rounds, self.chosen, strict=False))
+
+
+def _explore(
+    scores: Scores,
+    effects: int,
+    quadratic: Sequence[Quadratic],
+    alpha: float,
+    rng: np.random.Generator,
+) -> _Explored:
+    """Add significant effects to the linearised fit one by one."""
+    rounds = [_judge(scores, effects, quadratic)]
     chosen: list[tuple[int, float]] = []
-    groups: list[tuple[int, ...]] = []
     while len(chosen) < MOST_EFFECTS:
+        judged = rounds[-1]
         taken = {index for index, _ in chosen}
         significant = [index for index in judged.significant(alpha) if index not in taken]
         if not significant:
             break
         order, evidences = _ranked(judged)
         best = next(index for index in order if index in significant)
+        chosen.append((best, evidences[best]))
+        columns, precision = joining(judged.scores, best)
+        rounds.append(_judge(judged.scores.without(columns, precision, rng), effects, quadratic))
+    return _Explored(tuple(rounds), tuple(chosen))
+
+
+def _groups(found: _Explored, alpha: float) -> list[tuple[int, ...]]:
+    """For each chosen effect, itself first, those from which it cannot be told; none if alone."""
+    groups: list[tuple[int, ...]] = []
+    for judged, (best, _) in found.pairs():
+        order, evidences = _ranked(judged)
         questioned = _in_question(judged, order, evidences, best, alpha)
         signatures = {i: _signature(judged.scores, i)[0] for i in questioned}
         if others := rivals(judged.scores, best, questioned, signatures):
             groups.append((best, *others))
-        chosen.append((best, evidences[best]))
-        columns, precision = joining(judged.scores, best)
-        judged = _judge(
-            judged.scores.without(columns, precision, rng), len(judged.effects), quadratic
-        )
-    return chosen, groups, judged
+    return groups
 
 
 def _in_question(

@@ -166,7 +166,8 @@ def fit_effects(
         latest = _fitted(rows, effects[:count], masked, latest)
         (one,) = effect_columns(latest, [effects[count]])
         start = _searched(latest, one)
-        latest = fit(Model(rows, effects[: count + 1]), start=start, masked=masked)
+        model = Model(rows, effects[: count + 1])
+        latest = fit(model, start=start, masked=masked, gross=latest.gross)
     return _fitted(rows, effects, masked, latest)
 
 
@@ -180,9 +181,9 @@ def _fitted(
     if latest is None:
         return fit(model, masked=masked)
     state = latest.linear.state
-    rest = model.start(state.frame_rotation, state.frame_position).effects
+    rest = model.effects_at_rest
     values = (*state.effects, *rest[len(state.effects) :])
-    return fit(model, start=begin_at(state, values), masked=masked)
+    return fit(model, start=begin_at(state, values), masked=masked, gross=latest.gross)
 
 
 def begin_at(state: State, values: tuple[Array, ...]) -> State:

@@ -12,13 +12,13 @@ alarm exact.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from scipy import linalg
 
-from calib.arrays import Array
+from calib.arrays import Array, IntArray
 from calib.discover.candidate import Candidate
 from calib.discover.problem import LinearProblem
 from calib.discover.tails import log_tail
@@ -39,6 +39,33 @@ class Weighing:
     subset: tuple[int, ...]
     whiten: Array
     dof: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Stack:
+    """H hypotheses of k unknowns: ``chosen`` (H, k), ``whiten`` (H, T, k, k), ``dof`` (H, T)."""
+
+    chosen: IntArray
+    whiten: Array
+    dof: IntArray
+
+    def chi_squares(self, scores: Array) -> Array:
+        """Fall of chi-square (H T, D), from the candidate's scores (T, K, D)."""
+        everything = self.chosen.shape == (1, scores.shape[1])
+        picked = scores[None] if everything else scores[:, self.chosen].swapaxes(0, 1)
+        if self.chosen.shape[1] == 1:
+            squared = (self.whiten[..., 0] * picked[:, :, 0]) ** 2
+        else:
+            whitened = self.whiten @ picked
+            squared = np.einsum("htkd,htkd->htd", whitened, whitened)
+        return np.asarray(squared.reshape(-1, scores.shape[2]))
+
+    def weighings(self) -> list[Weighing]:
+        """One for each hypothesis."""
+        return [
+            Weighing(tuple(map(int, subset)), whiten, dof)
+            for subset, whiten, dof in zip(self.chosen, self.whiten, self.dof, strict=True)
+        ]
 
 
 @dataclass(eq=False)
@@ -77,15 +104,26 @@ class Scores:
         return np.asarray(np.einsum("rd,rd->d", self.residuals, self.residuals))
 
     @cached_property
+    def _stacks(self) -> list[list[_Stack]]:
+        """For every candidate its hypotheses, those of equally many unknowns together."""
+        found = []
+        for candidate, weight, norm in zip(self.candidates, self.weights, self.norms, strict=True):
+            stacks = [_stacked(weight, chosen) for chosen in candidate.by_count]
+            leading = _leading(weight, norm * candidate.sizes)
+            if np.any(leading.dof < stacks[0].dof):
+                stacks.append(leading)
+            found.append(stacks)
+        return found
+
+    @cached_property
     def weighings(self) -> list[list[Weighing]]:
         """For every candidate the whitening of each of its hypotheses; then its leading part."""
         found = []
-        for candidate, weight, norm in zip(self.candidates, self.weights, self.norms, strict=True):
-            weighings = [_weigh(weight, subset) for subset in candidate.hypotheses]
-            leading = _leading(weight, norm * candidate.sizes)
-            if np.any(leading.dof < weighings[0].dof):
-                weighings.append(leading)
-            found.append(weighings)
+        for candidate, stacks in zip(self.candidates, self._stacks, strict=True):
+            known = [one for stack in stacks for one in stack.weighings()]
+            own, leading = known[: len(candidate.hypotheses)], known[len(candidate.hypotheses) :]
+            place = {weighing.subset: weighing for weighing in own}
+            found.append([*(place[subset] for subset in candidate.hypotheses), *leading])
         return found
 
     @cached_property
@@ -96,13 +134,13 @@ class Scores:
     def level(self, index: int, scores: Array, squares: Array) -> Array:
         """Largest -log p of a candidate for given scores (T, k, D) and |e|^2 (D,)."""
         best = np.zeros(scores.shape[-1])
-        for weighing in self.weighings[index]:
-            chi2 = chi_squares(weighing, scores)
-            for dof in np.unique(weighing.dof):
+        for stack in self._stacks[index]:
+            chi2, freedom = stack.chi_squares(scores), stack.dof.reshape(-1)
+            for dof in np.unique(freedom):
                 if dof == 0:
                     continue
-                here = chi2[weighing.dof == dof]
-                left = np.maximum(squares - here, 0.0) / max(self.problem.trace - dof, 1.0)
+                here = chi2 if freedom.size == 1 else chi2[freedom == dof]
+                left = (squares - here) / max(self.problem.trace - dof, 1.0)
                 judged = (here / np.maximum(left, 1.0)).max(axis=0)
                 best = np.maximum(best, -log_tail(judged, int(dof)))
         return best
@@ -114,10 +152,10 @@ class Scores:
         With more missing than one effect, what one leaves is noise to the comparison of two.
         """
         left = [float(self.squares[0]) / max(self.problem.trace, 1.0)]
-        for index, weighings in enumerate(self.weighings):
-            for weighing in weighings:
-                chi2 = chi_squares(weighing, self.scores[index][:, :, :1])[:, 0]
-                dof = np.maximum(self.problem.trace - weighing.dof, 1.0)
+        for scores, stacks in zip(self.scores, self._stacks, strict=True):
+            for stack in stacks:
+                chi2 = stack.chi_squares(scores[:, :, :1])[:, 0]
+                dof = np.maximum(self.problem.trace - stack.dof.reshape(-1), 1.0)
                 left.append(float(np.min((self.squares[0] - chi2) / dof)))
         return float(np.sqrt(max(1.0, min(left))))
 
@@ -154,6 +192,16 @@ class Scores:
             weights=weights,
         )
 
+    def with_more(self, draws: int, rng: np.random.Generator) -> "Scores":
+        """The same with so many null draws more."""
+        residuals = self.problem.null_residuals(draws, rng)
+        scores = [
+            np.concatenate([old, unit @ residuals], axis=2)
+            for old, unit in zip(self.scores, self.units, strict=True)
+        ]
+        whole = np.concatenate([self.residuals, residuals], axis=1)
+        return replace(self, residuals=whole, scores=scores)
+
     def estimate(self, index: int, trial: int, subset: tuple[int, ...]) -> tuple[Array, Array]:
         """Values (k,) and covariance (k, k) of a hypothesis's unknowns, with their own priors."""
         chosen = list(subset)
@@ -187,17 +235,22 @@ def score(
     return Scores(problem, list(candidates), residuals, norms, units, scores, weights)
 
 
-def _weigh(weight: Array, subset: tuple[int, ...]) -> Weighing:
-    """V^-1/2 of a hypothesis at every trial, from weights (T, k, k); unseen directions dropped."""
-    chosen = np.array(subset, dtype=np.intp)
-    values, vectors = np.linalg.eigh(weight[:, chosen[:, None], chosen])
-    seen = values > BLIND * chosen.size
-    inverse = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
-    whiten = np.swapaxes(vectors, 1, 2) * inverse[:, :, None]
-    return Weighing(subset, whiten, seen.sum(axis=1))
+def _stacked(weight: Array, chosen: IntArray) -> _Stack:
+    """V^-1/2 of hypotheses (H, k) at every trial, from weights (T, K, K); unseen ones dropped."""
+    count = chosen.shape[1]
+    if count == 1:
+        values = weight[:, chosen[:, 0], chosen[:, 0]].T[:, :, None]
+        vectors: Array | None = None
+    else:
+        blocks = weight[:, chosen[:, :, None], chosen[:, None, :]].swapaxes(0, 1)
+        values, vectors = np.linalg.eigh(blocks)
+    seen = values > BLIND * count
+    inverse = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)[..., None]
+    whiten = inverse if vectors is None else np.swapaxes(vectors, -1, -2) * inverse
+    return _Stack(chosen, whiten, seen.sum(axis=2))
 
 
-def _leading(weight: Array, size: Array) -> Weighing:
+def _leading(weight: Array, size: Array) -> _Stack:
     """The whole group without directions in which it hardly moves the readings.
 
     In units of the unknowns' sizes (T, k) the readings see them along the eigenvectors of D V D.
@@ -209,7 +262,8 @@ def _leading(weight: Array, size: Array) -> Weighing:
     seen = values > LEADING**2 * np.maximum(values[:, -1:], 1e-300)
     inverse = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
     whiten = np.swapaxes(vectors * size[:, :, None], 1, 2) * inverse[:, :, None]
-    return Weighing(tuple(range(weight.shape[1])), whiten, seen.sum(axis=1))
+    whole = np.arange(weight.shape[1], dtype=np.intp)[None]
+    return _Stack(whole, whiten[None], seen.sum(axis=1)[None])
 
 
 def chi_squares(weighing: Weighing, scores: Array) -> Array:

@@ -30,6 +30,8 @@ class Fit:
         Of a step of all unknowns as :meth:`Model.moved` takes it: frames by rotation vectors.
     steps : int
         Gauss-Newton steps taken.
+    gross : tuple of BadReading
+        Of the bad ones, those where no nest can be, whatever the effects.
     """
 
     model: Model
@@ -38,6 +40,7 @@ class Fit:
     bad: tuple[BadReading, ...]
     step_covariance: Array
     steps: int
+    gross: tuple[BadReading, ...]
 
     @cached_property
     def jacobian(self) -> Array:
@@ -124,7 +127,13 @@ def frame_values(state: State, run: int) -> Array:
     return np.concatenate([state.frame_position[:, run], angles])
 
 
-def fit(model: Model, *, start: State | None = None, masked: Sequence[int] = ()) -> Fit:
+def fit(
+    model: Model,
+    *,
+    start: State | None = None,
+    masked: Sequence[int] = (),
+    gross: Sequence[BadReading] | None = None,
+) -> Fit:
     """Fit a model to its readings.
 
     Parameters
@@ -134,6 +143,9 @@ def fit(model: Model, *, start: State | None = None, masked: Sequence[int] = ())
         Where to begin: another fit of the same model, or a start for nonlinear unknowns.
     masked : sequence of int
         Readings (indices) that the operator has masked.
+    gross : sequence of BadReading, optional
+        Those of an earlier fit of the same readings, where ``start`` brings its frames: readings
+        where no nest can be are then not looked for again.
 
     Raises
     ------
@@ -143,12 +155,15 @@ def fit(model: Model, *, start: State | None = None, masked: Sequence[int] = ())
     bad = [bad_reading(model, row, "masked by the operator") for row in masked]
     allowed = model.usable.copy()
     allowed[list(masked)] = False
-    linear, gross = begin(model, allowed)
+    if gross is not None and start is not None:
+        linear = model.linearise(start)
+    else:
+        linear, gross = begin(model, allowed)
+        if start is not None:
+            linear = model.linearise(_with_frames(start, linear.state))
     bad += gross
     accepted = allowed.copy()
     accepted[[reading.row for reading in bad]] = False
-    if start is not None:
-        linear = model.linearise(_with_frames(start, linear.state))
     steps = 0
     for _ in range(3):
         linear, covariance, taken = optimise(model, linear, accepted)
@@ -162,7 +177,7 @@ def fit(model: Model, *, start: State | None = None, masked: Sequence[int] = ())
                 bad_reading(model, row, f"stray: {1000 * miss:.3g} um from where it should be")
             )
             accepted[row] = False
-    return Fit(model, linear, accepted, tuple(bad), covariance, steps)
+    return Fit(model, linear, accepted, tuple(bad), covariance, steps, tuple(gross))
 
 
 def _with_frames(start: State, begun: State) -> State:

@@ -167,14 +167,18 @@ class Model:
         extension = self.rows.extension[:, first]
         return self._closed(extension, self.machine.nominal, None, self.machine)
 
-    def start(self, rotation: Array, position: Array) -> State:
-        """Nominal parameters, effects at rest (first trial), frames (3, 3, K), (3, K)."""
-        effects = tuple(
+    @property
+    def effects_at_rest(self) -> tuple[Array, ...]:
+        """Values (U,) of effects that do nothing, nonlinear unknowns at a first trial."""
+        return tuple(
             at_trial(group, next(iter(effect.trials(self.rows)))) + effect.rest(self.rows)
             for effect, group in zip(self.effects, self.unknowns, strict=True)
         )
+
+    def start(self, rotation: Array, position: Array) -> State:
+        """Nominal parameters, effects at rest, frames (3, 3, K), (3, K)."""
         nominal = self.machine.nominal.copy()
-        return State(nominal, effects, rotation, position, self.nominal_configuration)
+        return State(nominal, self.effects_at_rest, rotation, position, self.nominal_configuration)
 
     def base_points(self) -> Array:
         """SMR centres (3, N) of the nominal machine in the base frame, mm."""
@@ -249,7 +253,7 @@ class Model:
         rows, (first, inverse) = self.rows, self._states
         started = any(np.any(linear) for linear in self._linear(state))
         if state.situation is None and started:
-            without = self.start(state.frame_rotation, state.frame_position).effects
+            without = self.effects_at_rest
             begun = self.linearise(replace(state, effects=without)).state
             state = replace(begun, effects=state.effects)
         moved = np.full_like(rows.extension, np.inf)
