@@ -21,8 +21,8 @@ PAIR_DRAWS = 200
 
 def shifted_scores(scores: Scores, index: int, signature: Array, draws: int) -> Array:
     """Scores (T, k, draws) of a candidate if ``signature`` (R,) were hidden in the null draws."""
-    shift = scores.units[index] @ scores.problem.project(signature)
-    return np.asarray(scores.scores[index][:, :, 1 : 1 + draws] + shift[:, :, None])
+    shift = scores.of_units(index, scores.problem.project(signature)[:, None])
+    return np.asarray(scores.scores[index][:, :, 1 : 1 + draws] + shift)
 
 
 def power(

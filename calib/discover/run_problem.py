@@ -13,13 +13,11 @@ from calib.discover.candidate import Candidate, Term, fill_missing
 from calib.discover.problem import LinearProblem
 from calib.discover.quadratic import Neighbours, Quadratic, blocks_of
 from calib.discover.structure import Carrier, Variable
-from calib.effects.component import Effect, Signature, Unknown
+from calib.effects.component import Effect, Unknown
 from calib.effects.tracker import rigid_motions
 from calib.identify.fitting import Fit
 from calib.mechanism.rigid import rotate, to_euler
 from calib.model.columns import at_trial, channels_known, whitened_columns
-
-FIELDS = ("extension", "parameters", "nest", "point", "twist")
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,31 +65,15 @@ def columns_at(fit: Fit, effect: Effect, trials: tuple[tuple[float, ...], ...]) 
     """Signatures of one effect at given trial values."""
     rows, situation = fit.model.rows, fit.linear.situation
     unknowns = effect.unknowns(rows)
-    linear = np.array([not unknown.nonlinear for unknown in unknowns])
-    signatures = [effect.signature(situation, at_trial(unknowns, trial)) for trial in trials]
-    parts = [whitened_columns(one, situation) for one in _merged(signatures, linear)]
-    columns = np.concatenate(parts).reshape(len(trials), int(linear.sum()), 3, rows.count)
+    linear = [not unknown.nonlinear for unknown in unknowns]
+    columns = np.empty((len(trials), sum(linear), 3, rows.count))
+    for trial, own in zip(trials, columns, strict=True):
+        signature = effect.signature(situation, at_trial(unknowns, trial))
+        own[:] = whitened_columns(signature, situation)[linear]
     known = channels_known(effect, rows)
-    return EffectColumns(effect, unknowns, trials, columns * known, known)
-
-
-def _merged(signatures: list[Signature], linear: BoolArray) -> list[Signature]:
-    """Join signatures of the same kind along their unknowns: one whitening for all trials."""
-    kinds = [tuple(getattr(one, field) is not None for field in FIELDS) for one in signatures]
-    merged: list[Signature] = []
-    at = 0
-    while at < len(signatures):
-        end = at
-        while end < len(signatures) and kinds[end] == kinds[at]:
-            end += 1
-        parts = {
-            field: np.concatenate([getattr(one, field)[linear] for one in signatures[at:end]])
-            for field, there in zip(FIELDS, kinds[at], strict=True)
-            if there
-        }
-        merged.append(Signature(**parts))
-        at = end
-    return merged
+    if not known.all():
+        columns *= known
+    return EffectColumns(effect, unknowns, trials, columns, known)
 
 
 def effect_candidates(
@@ -113,7 +95,7 @@ def _candidate(fit: Fit, problem: LinearProblem, one: EffectColumns) -> Candidat
 
 def _accepted(fit: Fit, columns: Array) -> Array:
     """(..., 3, N) -> (..., 3 A), contiguous."""
-    chosen = columns[..., fit.accepted]
+    chosen = columns if fit.accepted.all() else columns[..., fit.accepted]
     return np.ascontiguousarray(chosen.reshape(*columns.shape[:-2], -1))
 
 

@@ -80,8 +80,6 @@ class Scores:
         Observed residual first.
     norms : list of (T, k)
         Norm of each column before projection.
-    units : list of (T, k, R)
-        Columns divided by their norms.
     scores : list of (T, k, 1 + draws)
         Unit columns times residuals.
     weights : list of (T, k, k)
@@ -92,7 +90,6 @@ class Scores:
     candidates: Sequence[Candidate]
     residuals: Array
     norms: list[Array]
-    units: list[Array]
     scores: list[Array]
     weights: list[Array]
     remembered: dict[int, tuple[float, list[Array]]] = field(default_factory=dict, repr=False)
@@ -159,6 +156,10 @@ class Scores:
                 left.append(float(np.min((self.squares[0] - chi2) / dof)))
         return float(np.sqrt(max(1.0, min(left))))
 
+    def of_units(self, index: int, matrix: Array) -> Array:
+        """Unit columns of a candidate times a matrix (R, m): (T, k, m)."""
+        return _times(self.candidates[index].columns, matrix, self.norms[index])
+
     def without(self, columns: Array, precision: Array, rng: np.random.Generator) -> "Scores":
         """Scores after ``columns`` (k, R) with prior ``precision`` (k,) have joined the fit.
 
@@ -178,8 +179,7 @@ class Scores:
         pulled = half @ (columns @ self.residuals + prior)
         scores, weights = [], []
         for index, old in enumerate(self.scores):
-            unit = self.units[index]
-            cross = (unit.reshape(-1, unit.shape[2]) @ taken.T).reshape(*unit.shape[:2], -1)
+            cross = self.of_units(index, taken.T)
             scores.append(old - cross @ pulled)
             weights.append(self.weights[index] - cross @ np.swapaxes(cross, 1, 2))
         return Scores(
@@ -187,7 +187,6 @@ class Scores:
             candidates=self.candidates,
             residuals=self.residuals - taken.T @ pulled,
             norms=self.norms,
-            units=self.units,
             scores=scores,
             weights=weights,
         )
@@ -196,8 +195,8 @@ class Scores:
         """The same with so many null draws more."""
         residuals = self.problem.null_residuals(draws, rng)
         scores = [
-            np.concatenate([old, unit @ residuals], axis=2)
-            for old, unit in zip(self.scores, self.units, strict=True)
+            np.concatenate([old, self.of_units(index, residuals)], axis=2)
+            for index, old in enumerate(self.scores)
         ]
         whole = np.concatenate([self.residuals, residuals], axis=1)
         return replace(self, residuals=whole, scores=scores)
@@ -222,17 +221,25 @@ def score(
     residuals = np.concatenate(
         [problem.residual[:, None], problem.null_residuals(draws, rng)], axis=1
     )
-    norms, units, scores, weights = [], [], [], []
+    norms, scores, weights = [], [], []
     for candidate in candidates:
-        norm = np.sqrt(np.einsum("tkr,tkr->tk", candidate.columns, candidate.columns))
-        unit = candidate.columns / np.where(norm > 0.0, norm, 1.0)[:, :, None]
-        flat = unit.reshape(-1, problem.rows)
-        absorbed = (flat @ problem.absorbed.T).reshape(*norm.shape, -1)
+        columns = candidate.columns
+        products = columns @ np.swapaxes(columns, 1, 2)
+        norm = np.sqrt(np.diagonal(products, axis1=1, axis2=2))
+        absorbed = _times(columns, problem.absorbed.T, norm)
+        safe = np.where(norm > 0.0, norm, 1.0)
+        weight = products / safe[:, :, None] / safe[:, None, :]
         norms.append(norm)
-        units.append(unit)
-        scores.append((flat @ residuals).reshape(*norm.shape, -1))
-        weights.append(unit @ np.swapaxes(unit, 1, 2) - absorbed @ np.swapaxes(absorbed, 1, 2))
-    return Scores(problem, list(candidates), residuals, norms, units, scores, weights)
+        scores.append(_times(columns, residuals, norm))
+        weights.append(weight - absorbed @ np.swapaxes(absorbed, 1, 2))
+    return Scores(problem, list(candidates), residuals, norms, scores, weights)
+
+
+def _times(columns: Array, matrix: Array, norm: Array) -> Array:
+    """Columns (T, k, R) divided by their norms (T, k), times a matrix (R, m)."""
+    product = columns.reshape(-1, columns.shape[2]) @ matrix
+    product /= np.where(norm > 0.0, norm, 1.0).reshape(-1, 1)
+    return np.asarray(product.reshape(*norm.shape, -1))
 
 
 def _stacked(weight: Array, chosen: IntArray) -> _Stack:

@@ -22,9 +22,9 @@ from typing import Literal
 import numpy as np
 
 from calib.arrays import Array, IntArray
+from calib.effects.lever import lever_of, through, whitened_frame
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
-from calib.mechanism.rigid import cross, rotate
 from calib.mechanism.solve import Configuration
 from calib.runs.stack import Rows
 
@@ -90,14 +90,20 @@ class Situation:
         return self.rows.machine
 
     @cached_property
+    def whitened_frame(self) -> Array:
+        """Whitener times frame rotation, (3, 3, N)."""
+        return whitened_frame(self.rows.whitener, self.frame_rotation)
+
+    @cached_property
+    def lever(self) -> Array:
+        """Matrix (3, 6, N) from the platform's twist to the whitened reading."""
+        arm = self.base_point - self.position
+        return lever_of(self.whitened_frame, arm, self.rows.on_platform)
+
+    @cached_property
     def actuator_columns(self) -> Array:
         """Whitened derivative (n, 3, N) of the readings by each extension."""
-        rows = self.rows
-        arm = self.base_point - self.position
-        moved = np.stack([twist[:3] + cross(twist[3:], arm) for twist in self.actuator_twists])
-        turned = np.stack([rotate(self.frame_rotation, one) for one in moved]) * rows.on_platform
-        columns: Array = np.einsum("ijn,ujn->uin", rows.whitener, turned)
-        return columns
+        return through(self.lever, self.actuator_twists)
 
     def error_twists(self, name: str) -> Array:
         """Twist (6, N) of the platform per unit of a parameter, hidden error sources included."""

@@ -18,22 +18,13 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray, IntArray
 from calib.effects.component import Effect, Signature, Situation, Unknown
+from calib.effects.lever import apply, apply_each, through
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.rigid import cross, exponential, product, rotate
 from calib.mechanism.solve import Configuration, begun_at, forward, home_configuration
-from calib.model.columns import (
-    apply,
-    apply_each,
-    at_trial,
-    change_of,
-    channels_known,
-    lever_of,
-    through,
-    whitened_columns,
-    whitened_frame,
-)
+from calib.model.columns import at_trial, change_of, channels_known, whitened_columns
 from calib.runs.stack import Rows
 
 SETTLING_PASSES = 4
@@ -225,9 +216,7 @@ class Model:
         now = replace(state, configuration=closed, situation=situation)
         signatures = self._signatures(now)
         residual = rows.position - point - change_of(signatures, "point", point)
-        combined = whitened_frame(rows.whitener, turn)
-        lever = lever_of(combined, arm, rows.on_platform)
-        parts = [through(lever, situation.parameter_twists[self.free])]
+        parts = [through(situation.lever, situation.parameter_twists[self.free])]
         parts += [whitened_columns(signature, situation) for _, signature in signatures]
         parts += self._frame_columns(turned)
         return Linearised(now, residual, apply(rows.whitener, residual), np.concatenate(parts))
