@@ -25,6 +25,8 @@ from calib.discover.tails import log_tail
 
 BLIND = 1e-8
 """Directions of which less than this (squared norm after / before projection) is left are lost."""
+WELL_SEEN = 1e-3
+"""Of each direction at least this much (squared) is left: none can be lost, triangles will do."""
 LEADING = 0.25
 """Directions in which a group moves the readings by less than this part of the most it can do."""
 
@@ -247,14 +249,26 @@ def _stacked(weight: Array, chosen: IntArray) -> _Stack:
     count = chosen.shape[1]
     if count == 1:
         values = weight[:, chosen[:, 0], chosen[:, 0]].T[:, :, None]
-        vectors: Array | None = None
-    else:
-        blocks = weight[:, chosen[:, :, None], chosen[:, None, :]].swapaxes(0, 1)
-        values, vectors = np.linalg.eigh(blocks)
+        seen = values > BLIND
+        inverse = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
+        return _Stack(chosen, inverse[..., None], seen.sum(axis=2))
+    blocks = weight[:, chosen[:, :, None], chosen[:, None, :]].swapaxes(0, 1)
+    if (whiten := _triangular(blocks)) is not None:
+        return _Stack(chosen, whiten, np.full(blocks.shape[:2], count))
+    values, vectors = np.linalg.eigh(blocks)
     seen = values > BLIND * count
     inverse = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)[..., None]
-    whiten = inverse if vectors is None else np.swapaxes(vectors, -1, -2) * inverse
-    return _Stack(chosen, whiten, seen.sum(axis=2))
+    return _Stack(chosen, np.swapaxes(vectors, -1, -2) * inverse, seen.sum(axis=2))
+
+
+def _triangular(blocks: Array) -> Array | None:
+    """Inverse Cholesky factors of (..., k, k); None if any has a direction that is hardly seen."""
+    try:
+        factors = np.linalg.cholesky(blocks)
+    except np.linalg.LinAlgError:
+        return None
+    smallest = float(np.diagonal(factors, axis1=-2, axis2=-1).min())
+    return np.linalg.inv(factors) if smallest**2 > WELL_SEEN else None
 
 
 def _leading(weight: Array, size: Array) -> _Stack:
