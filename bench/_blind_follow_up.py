@@ -13,38 +13,51 @@ from mocks.simulate.files import points_csv, run_toml
 from mocks.simulate.run import SimulatedRun
 
 POSES = 10
+OFFERED = 4
+"""Effects that are weighed where nothing was named: those with the most evidence."""
+
+Answer = tuple[str | None, tuple[tuple[str, ...], ...]]
 
 
-def in_question(found: Discovery) -> list[str]:
-    """Effects between which a first run has not decided: its group, or what it ranks first.
+def named(found: Discovery) -> Answer:
+    """The effect that a run's first diagnosis names, and the groups that it reports."""
+    first = stage_of(found, 0).diagnosis
+    groups = dict.fromkeys((*first.indistinguishable, *found.indistinguishable))
+    return (first.best.name if first.best else None), tuple(groups)
 
-    Empty where it has named an effect and no other will do.
+
+def questions(found: Discovery) -> list[list[str]]:
+    """What a first run has left open: the named one and its rival, or what might be there unseen.
+
+    Empty where an effect was named, no other will do, and the hold-out has accepted it.
     """
-    if len(found.steps) > 1:
-        added = found.steps[1].added
-        return next((list(g[:2]) for g in found.indistinguishable if added in g), [])
+    name, groups = named(found)
+    if name is not None:
+        group = next((list(one[:2]) for one in groups if name in one), [])
+        if group or (len(found.steps) > 1 and found.steps[1].added == name):
+            return [group] if group else []
+        return [[name]]
     first = stage_of(found, 0)
-    held = first.effects
-    return [f.name for f in first.diagnosis.findings if f.name not in held][:1]
+    return [[f.name] for f in first.diagnosis.findings if f.name not in first.effects][:OFFERED]
 
 
-def follow_up(
-    refit: Refitter, found: Discovery, first: SimulatedRun, hidden: dict[str, float]
-) -> tuple[str | None, tuple[tuple[str, ...], ...]]:
-    """Design at most ten poses, measure them, discover from both runs: first effect, groups."""
-    asked = in_question(found)
+def follow_up(found: Discovery, first: SimulatedRun, hidden: dict[str, float]) -> Answer:
+    """Design at most ten poses, measure them, and diagnose both runs together.
+
+    Of several questions the one is asked to which the poses add most, by the designs' own account.
+    """
+    asked = questions(found)
     if not asked:
-        return found.steps[1].added, tuple(found.indistinguishable)
+        return named(found)
     fit = stage_of(found, 0).run.fit
     machine = fit.model.machine
     known = {effect.id: effect for effect in catalogue(machine)}
     rng = np.random.default_rng(first.plan.seed)
-    plan = design_follow_up(fit, [known[name] for name in asked], POSES, rng)
+    plans = [design_follow_up(fit, [known[name] for name in q], POSES, rng) for q in asked]
+    plan = max(plans, key=lambda one: one.certainty - min(one.before.values()))
     second = build_follow_up(first, hidden, plan.poses.task.T, plan.conditions)
     runs = [
         parse_run(run_toml(one), points_csv(one), actuators=len(machine.actuators))
         for one in (first, second)
     ]
-    again = discover_run(Refitter(stack(machine, runs), list(known.values())))
-    name = again.steps[1].added if len(again.steps) > 1 else None
-    return name, tuple(again.indistinguishable)
+    return named(discover_run(Refitter(stack(machine, runs), list(known.values()))))

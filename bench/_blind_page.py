@@ -94,7 +94,7 @@ def page(outcomes: Sequence[Any], machine: str, seconds: float) -> str:
         ("predicted minus observed power", "within 0.05", f"{gap:+.3f} over {len(powered)}"),
         ("hold-out over floor after the right effects", "<= 1.1",
          f"{np.mean([o.holdout_over_floor for o in correct]):.3f}" if correct else "-"),
-        ("hold-out rose at an accepted step", "never",
+        ("hold-out higher than before the last accepted step", "never",
          str(sum(o.holdout_rose for o in outcomes))),
         ("pairs told apart with probability < 0.8, reported as such", "all", reported),
         ("predicted minus observed probability to tell a pair apart", "", told),

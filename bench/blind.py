@@ -21,9 +21,10 @@ import numpy as np
 
 from app.files.machines import load_machine
 from bench._blind_cases import SIGMA_MM, Case, build, draw_cases, draw_nulls
-from bench._blind_follow_up import follow_up
+from bench._blind_follow_up import follow_up, named
 from bench._blind_judge import Foreseen, foreseen, pulls
 from bench._blind_page import page
+from calib.discover.forward import SLACK, Discovery
 from calib.discover.run_discovery import Refitter, discover_run, stage_of
 from calib.effects import catalogue
 from calib.errors import BadInput
@@ -39,8 +40,9 @@ from mocks.simulate.files import points_csv, run_toml
 class Outcome:
     """What was found in one case, beside the truth.
 
-    ``foreseen`` one for each hidden effect, in a model that has the others; ``after`` the first
-    effect and the groups after a designed follow-up, where there was one.
+    ``first`` is the effect that the first diagnosis names, ``found`` those that discovery has added
+    and kept; ``foreseen`` one for each hidden effect, in a model that has the others; ``after`` the
+    first effect and the groups after a designed follow-up, where there was one.
     """
 
     case: Case
@@ -98,20 +100,20 @@ def solve(case: Case) -> Outcome:
     refit = Refitter(rows, catalogue(machine))
     found = discover_run(refit)
     seconds = time.perf_counter() - begin
-    first, last = stage_of(found, 0), stage_of(found)
-    held = [stage_of(found, k).holdout for k in range(len(found.steps))]
+    last = stage_of(found)
+    name, groups = named(found)
     after = None
     if case.kind == "single" and case.sizes == (1.0,) and case.poses.startswith("designed"):
-        after = follow_up(refit, found, simulated, hidden)
+        after = follow_up(found, simulated, hidden)
     return Outcome(
         case=case,
-        adequate=first.diagnosis.adequate,
-        first=found.steps[1].added if len(found.steps) > 1 else None,
+        adequate=stage_of(found, 0).diagnosis.adequate,
+        first=name,
         found=last.effects,
-        groups=tuple(found.indistinguishable),
+        groups=groups,
         unexplained=last.diagnosis.unexplained.significant,
         holdout_over_floor=last.run.holdout.rms_mm / last.run.holdout.floor_mm,
-        holdout_rose=bool(np.any(np.diff(held) > 1e-9)),
+        holdout_rose=_rose(found),
         pulls=pulls(rows, hidden, last),
         foreseen=_foreseen(case, poses, hidden, refit),
         after=after,
@@ -119,6 +121,14 @@ def solve(case: Case) -> Outcome:
         seconds=seconds,
         hidden=hidden,
     )
+
+
+def _rose(found: Discovery) -> bool:
+    """Whether held-out poses are predicted worse in the end than before the last effect added."""
+    held = [step.stage.holdout for step in found.steps]
+    added = [k for k, step in enumerate(found.steps) if step.added is not None]
+    risen = any(held[k] > held[k - 1] * (1.0 + SLACK) for k in added)
+    return risen or bool(added and held[-1] > held[added[-1] - 1] * (1.0 + SLACK))
 
 
 def _foreseen(
