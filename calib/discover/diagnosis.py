@@ -180,7 +180,7 @@ def _groups(found: _Explored, alpha: float) -> list[tuple[int, ...]]:
     for judged, (best, _) in found.pairs():
         order, evidences = _ranked(judged)
         questioned = _in_question(judged, order, evidences, best, alpha)
-        signatures = {i: _signature(judged.scores, i)[0] for i in questioned}
+        signatures = {i: _at_least(judged.scores, i) for i in questioned}
         if others := rivals(judged.scores, best, questioned, signatures):
             groups.append((best, *others))
     return groups
@@ -213,6 +213,19 @@ def _signature(scores: Scores, index: int) -> tuple[Array, int, int]:
     subset = candidate.hypotheses[number]
     beta, _ = scores.estimate(index, trial, subset)
     return beta @ candidate.columns[trial, list(subset)], number, trial
+
+
+def _at_least(scores: Scores, index: int) -> Array:
+    """Signature (R,) of the best hypothesis at the lower end of what its estimate leaves open.
+
+    An effect that is significant is likelier over- than underestimated; one standard deviation of
+    noise, and what noise alone would explain, are taken off its length.
+    """
+    signature, number, trial = _signature(scores, index)
+    weighing = scores.weighings[index][number]
+    fall = float(chi_squares(weighing, scores.scores[index][:, :, :1])[trial, 0]) / scores.noise**2
+    beyond = np.sqrt(max(fall - float(weighing.dof[trial]), 0.0)) - 1.0
+    return np.asarray(signature * (max(beyond, 0.0) / np.sqrt(max(fall, 1e-300))))
 
 
 def joining(scores: Scores, index: int) -> tuple[Array, Array]:

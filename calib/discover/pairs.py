@@ -64,8 +64,8 @@ def rivals(
     """Candidates among ``questioned`` from which this run cannot tell ``best``.
 
     The probability of telling a pair apart is the smaller of both directions: either may be the
-    truth, each at its estimated size ``signatures[index]`` (R,). A pair is also undecided where
-    the readings themselves have left it so, whatever was to be expected.
+    truth, with its signature in ``signatures[index]`` (R,). A pair is also undecided where the
+    readings themselves have left it so, whatever was to be expected.
     """
     undecided = float(np.log(TOLD_APART / (1.0 - TOLD_APART)))
     mine, _ = observed(scores, best)
