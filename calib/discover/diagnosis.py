@@ -6,50 +6,35 @@ what is significant then, and belongs to no candidate, is unexplained.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from calib.arrays import Array
 from calib.discover.candidate import Candidate
 from calib.discover.evidence import observed
-from calib.discover.family import Family, family
 from calib.discover.findings import Dependence, Diagnosis, Estimate, Finding, Unexplained
 from calib.discover.pairs import rivals
 from calib.discover.problem import LinearProblem
 from calib.discover.quadratic import Quadratic
+from calib.discover.rounds import (
+    Exploration,
+    Round,
+    at_least,
+    best_hypothesis,
+    explore,
+    signature_of,
+)
 from calib.discover.scores import Scores, chi_squares, score
 
 ALPHA = 0.05
 DRAWS = 399
 FIRST_DRAWS = 99
-CLEAR = (0.1, 4.0)
-"""Parts of alpha: p-values below and above are decided by the first draws, all others by all."""
-STRUCTURE_SHARE = 0.05
-"""Part of the false alarms that structure of unknown origin may cause; effects have the rest."""
 IN_QUESTION = 7.0
 """Candidates whose evidence is less than e^7 below the best are still in question."""
 UNKNOWN_MARGIN = 10.0
 """Structure of unknown origin must beat the effects' evidence by e^10 to be preferred,"""
 UNKNOWN_SHARE = 0.1
 """and by this part of it: a scan meets no period exactly, at a cost that grows with the effect."""
-MOST_EFFECTS = 6
-
-
-@dataclass(frozen=True, eq=False)
-class _Round:
-    """One state of the linearised fit, judged."""
-
-    scores: Scores
-    family: Family
-    effects: tuple[int, ...]
-
-    def log_p(self, index: int) -> float:
-        return self.family.log_p(float(self.family.strengths[index, 0]))
-
-    def significant(self, alpha: float) -> list[int]:
-        limit = np.log(alpha) + 1e-9
-        return [index for index in self.effects if self.log_p(index) <= limit]
 
 
 def diagnose(
@@ -82,13 +67,11 @@ def diagnose(
     """
     first_draws = min(FIRST_DRAWS, draws)
     scores = score(problem, [*effects, *structure], rng, first_draws)
-    found = _explore(scores, len(effects), quadratic, alpha, rng)
+    found = explore(scores, len(effects), quadratic, alpha, rng)
     if draws > first_draws and found.close(alpha):
         scores = scores.with_more(draws - first_draws, rng)
-        found = _explore(scores, len(effects), quadratic, alpha, rng)
+        found = explore(scores, len(effects), quadratic, alpha, rng)
     first, last, chosen = found.rounds[0], found.rounds[-1], found.chosen
-    order, evidences = _ranked(first)
-    findings = {index: _finding(first, index, evidences[index]) for index in order}
     left = _unexplained(last, quadratic, alpha)
     before = _unexplained(first, quadratic, alpha)
     unknown = max((d.log_evidence for d in before.dependences), default=0.0)
@@ -97,7 +80,7 @@ def diagnose(
     if preferred and not left.significant:
         left = before
     return Diagnosis(
-        findings=tuple(findings[index] for index in order),
+        findings=tuple(_finding(first, index, value) for index, value in first.evidences.items()),
         explained_by=tuple(scores.candidates[index].name for index, _ in chosen),
         indistinguishable=tuple(
             tuple(scores.candidates[index].name for index in group)
@@ -112,146 +95,31 @@ def diagnose(
     )
 
 
-def _judge(scores: Scores, effects: int, quadratic: Sequence[Quadratic]) -> _Round:
-    """Join effects, structure and quadratic tests to a family."""
-    levels = [*scores.levels, *(test.level(scores.residuals) for test in quadratic)]
-    weights = np.ones(len(levels))
-    others = len(levels) - effects
-    if effects and others:
-        weights[effects:] = effects * STRUCTURE_SHARE / (1.0 - STRUCTURE_SHARE) / others
-    return _Round(scores, family(levels, weights), tuple(range(effects)))
-
-
-def _ranked(judged: _Round) -> tuple[list[int], dict[int, float]]:
-    evidences = {i: observed(judged.scores, i)[0] for i in judged.effects}
-    return sorted(judged.effects, key=lambda index: -evidences[index]), evidences
-
-
-@dataclass(frozen=True, eq=False)
-class _Explored:
-    """Rounds of the linearised fit, and the effect with its evidence that ended each but the last.
-
-    Effects are ``chosen`` one by one, the most evidence of the significant ones first.
-    """
-
-    rounds: tuple[_Round, ...]
-    chosen: tuple[tuple[int, float], ...]
-
-    def close(self, alpha: float) -> bool:
-        """Whether any decision is so close that it takes more null draws."""
-        decisive = [judged.log_p(index) for judged, (index, _) in self.pairs()]
-        last = self.rounds[-1]
-        decisive.append(last.log_p(int(np.argmax(last.family.strengths[:, 0]))))
-        low, high = np.log(alpha) + np.log(CLEAR)
-        return any(low < log_p < high for log_p in decisive)
-
-    def pairs(self) -> list[tuple[_Round, tuple[int, float]]]:
-        """Every round that chose, with what it chose."""
-        return list(zip(self.rounds, self.chosen, strict=False))
-
-
-def _explore(
-    scores: Scores,
-    effects: int,
-    quadratic: Sequence[Quadratic],
-    alpha: float,
-    rng: np.random.Generator,
-) -> _Explored:
-    """Add significant effects to the linearised fit one by one."""
-    rounds = [_judge(scores, effects, quadratic)]
-    chosen: list[tuple[int, float]] = []
-    while len(chosen) < MOST_EFFECTS:
-        judged = rounds[-1]
-        taken = {index for index, _ in chosen}
-        significant = [index for index in judged.significant(alpha) if index not in taken]
-        if not significant:
-            break
-        order, evidences = _ranked(judged)
-        best = next(index for index in order if index in significant)
-        chosen.append((best, evidences[best]))
-        columns, precision = joining(judged.scores, best)
-        rounds.append(_judge(judged.scores.without(columns, precision, rng), effects, quadratic))
-    return _Explored(tuple(rounds), tuple(chosen))
-
-
-def _groups(found: _Explored, alpha: float) -> list[tuple[int, ...]]:
+def _groups(found: Exploration, alpha: float) -> list[tuple[int, ...]]:
     """For each chosen effect, itself first, those from which it cannot be told; none if alone."""
     groups: list[tuple[int, ...]] = []
-    for judged, (best, _) in found.pairs():
-        order, evidences = _ranked(judged)
-        questioned = _in_question(judged, order, evidences, best, alpha)
-        signatures = {i: _at_least(judged.scores, i) for i in questioned}
+    for judged, best in found.decided():
+        questioned = _in_question(judged, best, alpha)
+        signatures = {index: at_least(judged.scores, index) for index in questioned}
         if others := rivals(judged.scores, best, questioned, signatures):
             groups.append((best, *others))
     return groups
 
 
-def _in_question(
-    judged: _Round, order: list[int], evidences: dict[int, float], best: int, alpha: float
-) -> list[int]:
+def _in_question(judged: Round, best: int, alpha: float) -> list[int]:
     """The best, and those that are significant on their own and not yet refuted by the data."""
-    own = judged.family.own_log_p
+    own, evidences = judged.family.own_log_p, judged.evidences
     return [
         index
-        for index in order
+        for index in evidences
         if index == best
         or (own[index] <= np.log(alpha) and evidences[index] > evidences[best] - IN_QUESTION)
     ]
 
 
-def _best_hypothesis(scores: Scores, index: int) -> tuple[int, int]:
-    """Number of the hypothesis and of the trial with the most evidence."""
-    _, parts = observed(scores, index)
-    number = int(np.argmax([part[:, 0].max() for part in parts]))
-    return number, int(np.argmax(parts[number][:, 0]))
-
-
-def _signature(scores: Scores, index: int) -> tuple[Array, int, int]:
-    """Signature (R,) of a candidate's best hypothesis at its estimate; hypothesis and trial."""
-    number, trial = _best_hypothesis(scores, index)
-    candidate = scores.candidates[index]
-    subset = candidate.hypotheses[number]
-    beta, _ = scores.estimate(index, trial, subset)
-    return beta @ candidate.columns[trial, list(subset)], number, trial
-
-
-def _at_least(scores: Scores, index: int) -> Array:
-    """Signature (R,) of the best hypothesis at the lower end of what its estimate leaves open.
-
-    An effect that is significant is likelier over- than underestimated; one standard deviation of
-    noise, and what noise alone would explain, are taken off its length.
-    """
-    signature, number, trial = _signature(scores, index)
-    weighing = scores.weighings[index][number]
-    fall = float(chi_squares(weighing, scores.scores[index][:, :, :1])[trial, 0]) / scores.noise**2
-    beyond = np.sqrt(max(fall - float(weighing.dof[trial]), 0.0)) - 1.0
-    return np.asarray(signature * (max(beyond, 0.0) / np.sqrt(max(fall, 1e-300))))
-
-
-def joining(scores: Scores, index: int) -> tuple[Array, Array]:
-    """Columns and prior precision with which a candidate joins the linearised fit.
-
-    The whole group at its best trial and, along a scanned unknown, first and second differences
-    of its signature between neighbouring trials: the refit would find the value between two.
-    """
-    candidate = scores.candidates[index]
-    _, trial = _best_hypothesis(scores, index)
-    columns = [*candidate.columns[trial]]
-    precision = [*candidate.prior_precision]
-    if len(candidate.trials) > 2 and len(candidate.trials[0]) == 1:
-        middle = min(max(trial, 1), len(candidate.trials) - 2)
-        beta, _ = scores.estimate(index, trial, candidate.hypotheses[0])
-        low, here, high = (beta @ candidate.columns[middle + step] for step in (-1, 0, 1))
-        for difference in (high - low, high + low - 2.0 * here):
-            if float(difference @ difference) > 0.0:
-                columns.append(difference)
-                precision.append(1e-2)
-    return np.array(columns), np.array(precision)
-
-
-def _finding(judged: _Round, index: int, evidence: float) -> Finding:
+def _finding(judged: Round, index: int, evidence: float) -> Finding:
     scores, candidate = judged.scores, judged.scores.candidates[index]
-    signature, number, trial = _signature(scores, index)
+    signature, number, trial = signature_of(scores, index)
     subset = candidate.hypotheses[number]
     weighing = scores.weighings[index][number]
     beta, covariance = scores.estimate(index, trial, candidate.hypotheses[0])
@@ -274,7 +142,7 @@ def _finding(judged: _Round, index: int, evidence: float) -> Finding:
     )
 
 
-def _unexplained(judged: _Round, quadratic: Sequence[Quadratic], alpha: float) -> Unexplained:
+def _unexplained(judged: Round, quadratic: Sequence[Quadratic], alpha: float) -> Unexplained:
     """Structure that is significant in a round, the channels with the most evidence first."""
     scores = judged.scores
     count = len(scores.candidates)
@@ -299,7 +167,7 @@ def _unexplained(judged: _Round, quadratic: Sequence[Quadratic], alpha: float) -
 def _dependence(scores: Scores, index: int, log_p: float) -> Dependence:
     candidate = scores.candidates[index]
     evidence, parts = observed(scores, index)
-    number, trial = _best_hypothesis(scores, index)
+    number, trial = best_hypothesis(scores, index)
     period = None
     if candidate.trials[trial]:
         period = _peak([one[0] for one in candidate.trials], parts[number][:, 0], trial)

@@ -17,9 +17,9 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray, IntArray
 from calib.discover.candidate import Candidate
-from calib.discover.diagnosis import joining
 from calib.discover.evidence import observed
 from calib.discover.problem import LinearProblem
+from calib.discover.rounds import joining
 from calib.discover.scores import Scores, score
 
 ENOUGH = 3.0
