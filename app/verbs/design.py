@@ -79,7 +79,8 @@ def command(
         )
     report = follow_up_report(plan, discriminate, begin, runs)
     if out is not None:
-        out.write_text(_poses_file(plan, report, seed), encoding="utf-8")
+        given = [f"--model {model}"] * (model is not None) + [f"--add {name}" for name in add]
+        out.write_text(_poses_file(plan, report, seed, given), encoding="utf-8")
         answer.say(f"written to {out}")
     answer.show(report, as_json, words(report))
 
@@ -152,12 +153,13 @@ def _coordinate(name: str, value: float) -> str:
     return f"{value:.2f}" if name in "xyz" else f"{np.rad2deg(value):.3f}"
 
 
-def _poses_file(plan: Plan, report: dict[str, Any], seed: int) -> str:
+def _poses_file(plan: Plan, report: dict[str, Any], seed: int, given: list[str]) -> str:
     first, second = report["discriminate"]
     about: dict[str, Any] = {"discriminate": f"{first} {second}", "seed": seed}
     about |= {f"predicted_{name}": value for name, value in plan.after.items()}
     about |= {f"condition_{name}": value for name, value in plan.conditions.items()}
     command = f"pkmcal design {' '.join(report['runs'])} --discriminate {first} {second}"
+    command += "".join(f" {option}" for option in given)
     command += f" --n {plan.poses.count} --seed {seed}"
     title = f"{plan.poses.count} poses that tell {first} from {second}"
     return render_pose_file(labels_for(plan.poses.count), plan.poses, title, about, command)

@@ -67,9 +67,12 @@ def words(report: dict[str, Any]) -> str:
             steps,
         ),
         "",
-        f"effects found: {', '.join(report['effects']) or 'none'}",
+        *_in_the_model(report),
         *(f"  {line}" for line in sizes(report["parameters"])),
     ]
+    if report["refused"]:
+        refused = ", ".join(report["refused"])
+        lines.append(f"Refused, held-out poses being predicted no better with it: {refused}")
     lines += [
         f"This run cannot tell apart: {', '.join(group)}" for group in report["indistinguishable"]
     ]
@@ -77,3 +80,12 @@ def words(report: dict[str, Any]) -> str:
         channels = ", ".join(report["unexplained"]["channels"])
         lines.append(f"Structure is left that no known effect explains; it depends on: {channels}")
     return "\n".join([*lines, *bad_lines(report), "", report["advice"]])
+
+
+def _in_the_model(report: dict[str, Any]) -> list[str]:
+    """What the operator put in, and what was found beside it."""
+    added = {step["added"] for step in report["steps"]}
+    found = [name for name in report["effects"] if name in added]
+    given = [name for name in report["effects"] if name not in added]
+    told = [f"effects put in: {', '.join(given)}"] if given else []
+    return [*told, f"effects found: {', '.join(found) or 'none'}"]

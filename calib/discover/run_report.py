@@ -1,6 +1,7 @@
 """What diagnosis and discovery say: ``pkm-diagnosis/1`` and ``pkm-discovery/1``, and in words."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -60,8 +61,20 @@ def discovery_report(discovery: Discovery) -> dict[str, Any]:
         "bad_readings": bad_readings(last.fit),
         "parameters": effect_parameters(last.fit),
         "refused": list(discovery.refused),
-        "advice": advice(last),
+        "advice": _refused(last, discovery.refused) or advice(last),
     }
+
+
+def _refused(last: RunDiagnosis, refused: Sequence[str]) -> str:
+    """What to do about an effect that is called for and that held-out poses do not confirm."""
+    best = last.diagnosis.best
+    if best is None or best.name not in refused:
+        return ""
+    return (
+        f"{best.name} is called for (p = {best.p_value:.2g}), but held-out poses are predicted no "
+        f"better with it, so it was not added. More poses decide: pkmcal design --discriminate "
+        f"{best.name} nothing"
+    )
 
 
 def _groups(discovery: Discovery) -> list[tuple[str, ...]]:

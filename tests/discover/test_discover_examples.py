@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from app.cli import run as pkmcal
+from app.verbs.discover import words
 
 RUNS = Path(__file__).parents[1] / "data" / "runs"
 
@@ -78,3 +79,17 @@ def test_discover_examples_saved_model_begins_the_next_diagnosis(capsys, tmp_pat
 def test_discover_examples_same_answer_every_time(capsys):
     run = str(RUNS / "no-effect")
     assert answer(capsys, "diagnose", run) == answer(capsys, "diagnose", run)
+
+
+def test_discover_examples_what_was_put_in_is_not_called_found(capsys):
+    assert pkmcal(["discover", str(RUNS / "backlash-leg-3"), "--add", "tracker-scale"]) == 0
+    said = capsys.readouterr().out
+    assert "effects put in: tracker-scale" in said
+    assert "effects found: backlash" in said
+
+
+def test_discover_examples_refused_effects_are_told(capsys):
+    report = answer(capsys, "discover", str(RUNS / "no-effect"))
+    assert "Refused" not in words(report)
+    said = words({**report, "refused": ["screw-twist"]})
+    assert "Refused, held-out poses being predicted no better with it: screw-twist" in said

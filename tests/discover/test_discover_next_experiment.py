@@ -141,9 +141,10 @@ def test_verb_writes_a_poses_file_that_measure_reads(tmp_path):
     answer = CliRunner().invoke(
         command,
         [str(RUNS / "no-effect"), "--discriminate", "backlash", "settling", "--n", "5",
-         "--candidates", "60", "--out", str(out), "--json"],
+         "--candidates", "60", "--add", "gravity-sag", "--out", str(out), "--json"],
     )  # fmt: skip
     assert answer.exit_code == 0, answer.output
+    assert "--discriminate backlash settling --add gravity-sag --n 5" in out.read_text()
     report = json.loads(answer.stdout)
     assert report["format"] == "pkm-follow-up/1"
     read = read_pose_file(out, load_machine("hexapod"))
