@@ -1,5 +1,6 @@
 """The discovery of one analysis: which effects are in the model, and how the error fell."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -73,7 +74,12 @@ class Search:
         """Put an effect in; raises :class:`BadInput` if held-out poses speak against it."""
         before = self.present.run.holdout.rms_mm
         names = (*self.present.effects, name)
-        after = self.refit(names).run.holdout.rms_mm
+        after = self.refit(names).holdout
+        if not math.isfinite(after):
+            raise BadInput(
+                f"{name} is not accepted: the readings do not determine a model with it",
+                remedy="Choose another, or measure more",
+            )
         if after > before * (1.0 + SLACK):
             raise BadInput(
                 f"{name} is not accepted: poses that the fit has not seen would be predicted worse "
