@@ -23,7 +23,7 @@ from app.files.machines import load_machine
 from bench._blind_cases import SIGMA_MM, Case, build, draw_cases, draw_nulls
 from bench._blind_follow_up import follow_up, named
 from bench._blind_judge import Foreseen, foreseen, pulls
-from bench._blind_page import page
+from bench._blind_page import INTRODUCTION, page
 from calib.discover.forward import SLACK, Discovery
 from calib.discover.run_discovery import Refitter, discover_run, stage_of
 from calib.effects import catalogue
@@ -171,7 +171,7 @@ def main() -> None:
     parser.add_argument("--page", type=Path)
     options = parser.parse_args()
     command = f"python -m bench blind --cases {options.cases} --null {options.null}"
-    text = f"# Blind trial\n\nWritten by `{command} --seed {options.seed}`.\n"
+    text = f"# Blind trial\n\nWritten by `{command} --seed {options.seed}`.\n{INTRODUCTION}"
     for machine in options.machines.split(","):
         begin = time.perf_counter()
         cases = [
