@@ -21,14 +21,14 @@ from scipy import linalg
 from calib.arrays import Array, IntArray
 from calib.discover.candidate import Candidate
 from calib.discover.problem import LinearProblem
-from calib.discover.tails import log_tail
+from calib.discover.tails import log_any, log_tail, looks
 
 BLIND = 1e-8
 """Directions of which less than this (squared norm after / before projection) is left are lost."""
 WELL_SEEN = 1e-3
 """Of each direction at least this much (squared) is left: none can be lost, triangles will do."""
-LEADING = 0.25
-"""Directions in which a group moves the readings by less than this part of the most it can do."""
+EVEN = 0.9
+"""A group that is seen so evenly needs no test in which its directions weigh differently."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class _Stack:
 
     chosen: IntArray
     whiten: Array
-    dof: IntArray
+    dof: Array
 
     def chi_squares(self, scores: Array) -> Array:
         """Fall of chi-square (H T, D), from the candidate's scores (T, K, D)."""
@@ -105,43 +105,82 @@ class Scores:
     @cached_property
     def _stacks(self) -> list[list[_Stack]]:
         """For every candidate its hypotheses, those of equally many unknowns together."""
-        found = []
-        for candidate, weight, norm in zip(self.candidates, self.weights, self.norms, strict=True):
-            stacks = [_stacked(weight, chosen) for chosen in candidate.by_count]
-            leading = _leading(weight, norm * candidate.sizes)
-            if np.any(leading.dof < stacks[0].dof):
-                stacks.append(leading)
-            found.append(stacks)
+        return [
+            [_stacked(weight, chosen) for chosen in candidate.by_count]
+            for candidate, weight in zip(self.candidates, self.weights, strict=True)
+        ]
+
+    @cached_property
+    def _softs(self) -> list[_Stack | None]:
+        """For every candidate its soft test; None where the whole group is seen evenly."""
+        found: list[_Stack | None] = []
+        for candidate, weight, norm, stacks in zip(
+            self.candidates, self.weights, self.norms, self._stacks, strict=True
+        ):
+            soft = _soft(weight, norm * candidate.sizes) if len(candidate.terms) > 1 else None
+            even = soft is None or not np.any(soft.dof < EVEN * stacks[0].dof)
+            found.append(None if even else soft)
         return found
 
     @cached_property
     def weighings(self) -> list[list[Weighing]]:
-        """For every candidate the whitening of each of its hypotheses; then its leading part."""
+        """For every candidate the whitening of each of its hypotheses."""
         found = []
         for candidate, stacks in zip(self.candidates, self._stacks, strict=True):
-            known = [one for stack in stacks for one in stack.weighings()]
-            own, leading = known[: len(candidate.hypotheses)], known[len(candidate.hypotheses) :]
-            place = {weighing.subset: weighing for weighing in own}
-            found.append([*(place[subset] for subset in candidate.hypotheses), *leading])
+            place = {one.subset: one for stack in stacks for one in stack.weighings()}
+            found.append([place[subset] for subset in candidate.hypotheses])
         return found
 
     @cached_property
+    def _both(self) -> list[tuple[Array, Array | None]]:
+        """For every candidate -log p (1 + draws,) by its best hypothesis, and by its soft test."""
+        return [self._apart(index, found, self.squares) for index, found in enumerate(self.scores)]
+
+    @cached_property
+    def _looks(self) -> list[tuple[float, float]]:
+        """For every candidate how many independent looks the two tests take."""
+        return [
+            (looks(best[1:]), 1.0 if soft is None else looks(soft[1:])) for best, soft in self._both
+        ]
+
+    @cached_property
     def levels(self) -> list[Array]:
-        """For every candidate the largest -log p over its hypotheses and trials, (1 + draws,)."""
-        return [self.level(index, scores, self.squares) for index, scores in enumerate(self.scores)]
+        """For every candidate its -log p, (1 + draws,), the observation first."""
+        return [self._joined(index, *both) for index, both in enumerate(self._both)]
 
     def level(self, index: int, scores: Array, squares: Array) -> Array:
-        """Largest -log p of a candidate for given scores (T, k, D) and |e|^2 (D,)."""
+        """-log p of a candidate for given scores (T, k, D) and |e|^2 (D,).
+
+        By its best hypothesis and trial, or by the soft test of the whole group where that is
+        smaller: a maximum over parts is weak where many unknowns act, the soft test where one does.
+        Each pays for its own looks.
+        """
+        return self._joined(index, *self._apart(index, scores, squares))
+
+    def _joined(self, index: int, best: Array, soft: Array | None) -> Array:
+        if soft is None:
+            return best
+        own, other = self._looks[index]
+        return np.maximum(-log_any(-best, own), -log_any(-soft, other))
+
+    def _apart(self, index: int, scores: Array, squares: Array) -> tuple[Array, Array | None]:
         best = np.zeros(scores.shape[-1])
         for stack in self._stacks[index]:
-            chi2, freedom = stack.chi_squares(scores), stack.dof.reshape(-1)
-            for dof in np.unique(freedom):
-                if dof == 0:
-                    continue
-                here = chi2 if freedom.size == 1 else chi2[freedom == dof]
-                left = (squares - here) / max(self.problem.trace - dof, 1.0)
-                judged = (here / np.maximum(left, 1.0)).max(axis=0)
-                best = np.maximum(best, -log_tail(judged, int(dof)))
+            best = np.maximum(best, self._largest(stack, scores, squares))
+        soft = self._softs[index]
+        return best, None if soft is None else self._largest(soft, scores, squares)
+
+    def _largest(self, stack: _Stack, scores: Array, squares: Array) -> Array:
+        """Largest -log p (D,) over the hypotheses of a stack and their trials."""
+        best = np.zeros(scores.shape[-1])
+        chi2, freedom = stack.chi_squares(scores), stack.dof.reshape(-1)
+        for dof in np.unique(freedom):
+            if dof == 0:
+                continue
+            here = chi2 if freedom.size == 1 else chi2[freedom == dof]
+            left = (squares - here) / max(self.problem.trace - dof, 1.0)
+            judged = (here / np.maximum(left, 1.0)).max(axis=0)
+            best = np.maximum(best, -log_tail(judged, float(dof)))
         return best
 
     @cached_property
@@ -271,20 +310,23 @@ def _triangular(blocks: Array) -> Array | None:
     return np.linalg.inv(factors) if smallest**2 > WELL_SEEN else None
 
 
-def _leading(weight: Array, size: Array) -> _Stack:
-    """The whole group without directions in which it hardly moves the readings.
+def _soft(weight: Array, size: Array) -> _Stack:
+    """The whole group, each direction weighed by how far its unknowns would move the readings.
 
-    In units of the unknowns' sizes (T, k) the readings see them along the eigenvectors of D V D.
-    Where a group of many is seen along few directions (two dozen joint tilts along six), the rest
-    adds degrees of freedom and no signal; amplitudes of like size show along the leading ones.
+    With unknowns of standard deviation ``size`` (T, k) the readings see variances v, the
+    eigenvalues of D V D; the most powerful test for such a group is sum w a^2, w = v / (1 + v).
+    Under the null that is near to g times a chi-square with h degrees of freedom, g = sum w^2 /
+    sum w, h = (sum w)^2 / sum w^2 (Satterthwaite 1946); it is divided by g here, and ``dof`` is h.
     """
-    scaled = weight * size[:, :, None] * size[:, None, :]
-    values, vectors = np.linalg.eigh(scaled)
-    seen = values > LEADING**2 * np.maximum(values[:, -1:], 1e-300)
-    inverse = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
-    whiten = np.swapaxes(vectors * size[:, :, None], 1, 2) * inverse[:, :, None]
+    values, vectors = np.linalg.eigh(weight * size[:, :, None] * size[:, None, :])
+    seen = values > BLIND * np.maximum(values[:, -1:], 1e-300)
+    known = np.where(seen, values, 1.0)
+    worth = np.where(seen, known / (1.0 + known), 0.0)
+    total, squared = worth.sum(axis=1), np.maximum(np.sum(worth**2, axis=1), 1e-300)
+    scale = np.sqrt(worth * (total / squared)[:, None] / known)
+    whiten = np.swapaxes(vectors * size[:, :, None], 1, 2) * scale[:, :, None]
     whole = np.arange(weight.shape[1], dtype=np.intp)[None]
-    return _Stack(whole, whiten[None], seen.sum(axis=1)[None])
+    return _Stack(whole, whiten[None], np.round(4.0 * total**2 / squared)[None] / 4.0)
 
 
 def chi_squares(weighing: Weighing, scores: Array) -> Array:

@@ -11,7 +11,7 @@ TABLE_END = 300.0
 """Chi-square up to which values are interpolated in a table."""
 
 
-def log_tail(chi2: Array, dof: int) -> Array:
+def log_tail(chi2: Array, dof: float) -> Array:
     """log P(chi-square with ``dof`` degrees of freedom > chi2), to 1e-4; 0 for no freedom."""
     if dof == 0:
         return np.zeros_like(chi2)
@@ -23,15 +23,15 @@ def log_tail(chi2: Array, dof: int) -> Array:
     return answer
 
 
-@lru_cache(maxsize=256)
-def _table(dof: int) -> tuple[Array, Array, float]:
+@lru_cache(maxsize=1024)
+def _table(dof: float) -> tuple[Array, Array, float]:
     """Square roots of chi-square, log tail at them, and the end of the table."""
     end = TABLE_END + 2.0 * dof
     roots = np.linspace(0.0, np.sqrt(end), 600)
     return roots, np.log(special.chdtrc(dof, roots**2)), end
 
 
-def _far_tail(chi2: Array, dof: int) -> Array:
+def _far_tail(chi2: Array, dof: float) -> Array:
     """Far from the mean: Gamma(a, x) = x^(a-1) e^-x / (1 - (a-1)/(x - (a-3) - ...)), a = dof/2.
 
     Lentz's continued fraction x + 1 - a - 1(1 - a)/(x + 3 - a - ...), Abramowitz & Stegun 6.5.31

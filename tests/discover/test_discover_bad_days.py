@@ -122,7 +122,9 @@ def test_discover_bad_days_two_passes_swapped_are_listed(capsys, changed):
 
 def test_discover_bad_days_one_nest_is_enough(capsys, changed):
     run = changed("backlash-leg-3", only(lambda row: row["nest"] in ("", "3", "b1", "b2", "b3")))
-    assert answer(capsys, "discover", run)["effects"] == ["backlash"]
+    report = answer(capsys, "discover", run)
+    assert report["steps"][1]["added"] == "backlash"
+    assert report["steps"][1]["holdout_rms_um"] < report["steps"][0]["holdout_rms_um"]
 
 
 def test_discover_bad_days_few_poses_are_said_to_show_little(capsys, changed):

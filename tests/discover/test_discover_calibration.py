@@ -204,12 +204,15 @@ def test_directions_that_hardly_move_the_readings_cost_nothing():
     columns = np.concatenate([lab.one(lab.x**3, 0)[None], faint])
     crowd = lab.effect("crowd", columns)
     hidden = 3.0 * columns[0] * 9.0 / np.linalg.norm(lab.fitted(0.0, rng).project(columns[0]))
-    found = diagnose(lab.fitted(hidden / 6.0, rng), [crowd], rng=rng, draws=199)
-    whole, leading = found.scores.weighings[0]
-    assert (whole.dof[0], leading.dof[0]) == (10, 1)
-    scores = found.scores.scores[0][:, :, :1]
-    falls = [float(chi_squares(weighing, scores)[0, 0]) for weighing in (whole, leading)]
-    assert log_tail(np.array(falls[1:]), 1)[0] < log_tail(np.array(falls[:1]), 10)[0]
+    one = lab.effect("one", columns[:1])
+    found = diagnose(lab.fitted(hidden / 6.0, rng), [crowd, one], rng=rng, draws=199)
+    (whole,) = found.scores.weighings[0]
+    fall = chi_squares(whole, found.scores.scores[0][:, :, :1])[0, 0]
+    blunt = -log_tail(np.array([fall]), int(whole.dof[0]))[0]
+    crowded, alone = (level[0] for level in found.scores.levels)
+    assert whole.dof[0] == 10
+    assert crowded > blunt + 1.0
+    assert crowded > alone - 1.5
 
 
 @pytest.mark.parametrize("dof", [1, 2, 5, 24])
