@@ -24,7 +24,8 @@ from calib.discover.rounds import (
     explore,
     signature_of,
 )
-from calib.discover.scores import Scores, chi_squares, score
+from calib.discover.scores import Scores, score
+from calib.discover.weighing import chi_squares
 
 ALPHA = 0.05
 DRAWS = 399

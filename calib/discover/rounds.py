@@ -10,7 +10,8 @@ from calib.arrays import Array
 from calib.discover.evidence import observed
 from calib.discover.family import Family, family
 from calib.discover.quadratic import Quadratic
-from calib.discover.scores import Scores, chi_squares
+from calib.discover.scores import Scores
+from calib.discover.weighing import chi_squares
 
 STRUCTURE_SHARE = 0.05
 """Part of the false alarms that structure of unknown origin may cause; effects have the rest."""

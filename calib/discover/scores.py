@@ -18,56 +18,14 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg
 
-from calib.arrays import Array, IntArray
+from calib.arrays import Array
 from calib.discover.candidate import Candidate
 from calib.discover.problem import LinearProblem
 from calib.discover.tails import log_any, log_tail, looks
+from calib.discover.weighing import Stack, Weighing, soft_test, stacked
 
-BLIND = 1e-8
-"""Directions of which less than this (squared norm after / before projection) is left are lost."""
-WELL_SEEN = 1e-3
-"""Of each direction at least this much (squared) is left: none can be lost, triangles will do."""
 EVEN = 0.9
 """A group that is seen so evenly needs no test in which its directions weigh differently."""
-
-
-@dataclass(frozen=True, eq=False)
-class Weighing:
-    """Whitening of one hypothesis at every trial: a = whiten @ s.
-
-    ``whiten`` (T, k, k), rows of directions that are not seen are zero; ``dof`` (T,).
-    """
-
-    subset: tuple[int, ...]
-    whiten: Array
-    dof: Array
-
-
-@dataclass(frozen=True, eq=False)
-class _Stack:
-    """H hypotheses of k unknowns: ``chosen`` (H, k), ``whiten`` (H, T, k, k), ``dof`` (H, T)."""
-
-    chosen: IntArray
-    whiten: Array
-    dof: Array
-
-    def chi_squares(self, scores: Array) -> Array:
-        """Fall of chi-square (H T, D), from the candidate's scores (T, K, D)."""
-        everything = self.chosen.shape == (1, scores.shape[1])
-        picked = scores[None] if everything else scores[:, self.chosen].swapaxes(0, 1)
-        if self.chosen.shape[1] == 1:
-            squared = (self.whiten[..., 0] * picked[:, :, 0]) ** 2
-        else:
-            whitened = self.whiten @ picked
-            squared = np.einsum("htkd,htkd->htd", whitened, whitened)
-        return np.asarray(squared.reshape(-1, scores.shape[2]))
-
-    def weighings(self) -> list[Weighing]:
-        """One for each hypothesis."""
-        return [
-            Weighing(tuple(map(int, subset)), whiten, dof)
-            for subset, whiten, dof in zip(self.chosen, self.whiten, self.dof, strict=True)
-        ]
 
 
 @dataclass(eq=False)
@@ -103,21 +61,21 @@ class Scores:
         return np.asarray(np.einsum("rd,rd->d", self.residuals, self.residuals))
 
     @cached_property
-    def _stacks(self) -> list[list[_Stack]]:
+    def _stacks(self) -> list[list[Stack]]:
         """For every candidate its hypotheses, those of equally many unknowns together."""
         return [
-            [_stacked(weight, chosen) for chosen in candidate.by_count]
+            [stacked(weight, chosen) for chosen in candidate.by_count]
             for candidate, weight in zip(self.candidates, self.weights, strict=True)
         ]
 
     @cached_property
-    def _softs(self) -> list[_Stack | None]:
+    def _softs(self) -> list[Stack | None]:
         """For every candidate its soft test; None where the whole group is seen evenly."""
-        found: list[_Stack | None] = []
+        found: list[Stack | None] = []
         for candidate, weight, norm, stacks in zip(
             self.candidates, self.weights, self.norms, self._stacks, strict=True
         ):
-            soft = _soft(weight, norm * candidate.sizes) if len(candidate.terms) > 1 else None
+            soft = soft_test(weight, norm * candidate.sizes) if len(candidate.terms) > 1 else None
             even = soft is None or not np.any(soft.dof < EVEN * stacks[0].dof)
             found.append(None if even else soft)
         return found
@@ -170,7 +128,7 @@ class Scores:
         soft = self._softs[index]
         return best, None if soft is None else self._largest(soft, scores, squares)
 
-    def _largest(self, stack: _Stack, scores: Array, squares: Array) -> Array:
+    def _largest(self, stack: Stack, scores: Array, squares: Array) -> Array:
         """Largest -log p (D,) over the hypotheses of a stack and their trials."""
         best = np.zeros(scores.shape[-1])
         chi2, freedom = stack.chi_squares(scores), stack.dof.reshape(-1)
@@ -281,55 +239,3 @@ def _times(columns: Array, matrix: Array, norm: Array) -> Array:
     product = columns.reshape(-1, columns.shape[2]) @ matrix
     product /= np.where(norm > 0.0, norm, 1.0).reshape(-1, 1)
     return np.asarray(product.reshape(*norm.shape, -1))
-
-
-def _stacked(weight: Array, chosen: IntArray) -> _Stack:
-    """V^-1/2 of hypotheses (H, k) at every trial, from weights (T, K, K); unseen ones dropped."""
-    count = chosen.shape[1]
-    if count == 1:
-        values = weight[:, chosen[:, 0], chosen[:, 0]].T[:, :, None]
-        seen = values > BLIND
-        inverse = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
-        return _Stack(chosen, inverse[..., None], seen.sum(axis=2))
-    blocks = weight[:, chosen[:, :, None], chosen[:, None, :]].swapaxes(0, 1)
-    if (whiten := _triangular(blocks)) is not None:
-        return _Stack(chosen, whiten, np.full(blocks.shape[:2], count))
-    values, vectors = np.linalg.eigh(blocks)
-    seen = values > BLIND * count
-    inverse = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)[..., None]
-    return _Stack(chosen, np.swapaxes(vectors, -1, -2) * inverse, seen.sum(axis=2))
-
-
-def _triangular(blocks: Array) -> Array | None:
-    """Inverse Cholesky factors of (..., k, k); None if any has a direction that is hardly seen."""
-    try:
-        factors = np.linalg.cholesky(blocks)
-    except np.linalg.LinAlgError:
-        return None
-    smallest = float(np.diagonal(factors, axis1=-2, axis2=-1).min())
-    return np.linalg.inv(factors) if smallest**2 > WELL_SEEN else None
-
-
-def _soft(weight: Array, size: Array) -> _Stack:
-    """The whole group, each direction weighed by how far its unknowns would move the readings.
-
-    With unknowns of standard deviation ``size`` (T, k) the readings see variances v, the
-    eigenvalues of D V D; the most powerful test for such a group is sum w a^2, w = v / (1 + v).
-    Under the null that is near to g times a chi-square with h degrees of freedom, g = sum w^2 /
-    sum w, h = (sum w)^2 / sum w^2 (Satterthwaite 1946); it is divided by g here, and ``dof`` is h.
-    """
-    values, vectors = np.linalg.eigh(weight * size[:, :, None] * size[:, None, :])
-    seen = values > BLIND * np.maximum(values[:, -1:], 1e-300)
-    known = np.where(seen, values, 1.0)
-    worth = np.where(seen, known / (1.0 + known), 0.0)
-    total, squared = worth.sum(axis=1), np.maximum(np.sum(worth**2, axis=1), 1e-300)
-    scale = np.sqrt(worth * (total / squared)[:, None] / known)
-    whiten = np.swapaxes(vectors * size[:, :, None], 1, 2) * scale[:, :, None]
-    whole = np.arange(weight.shape[1], dtype=np.intp)[None]
-    return _Stack(whole, whiten[None], np.round(4.0 * total**2 / squared)[None] / 4.0)
-
-
-def chi_squares(weighing: Weighing, scores: Array) -> Array:
-    """Fall of chi-square (T, D) by a hypothesis, from its candidate's scores (T, k, D)."""
-    whitened = weighing.whiten @ scores[:, list(weighing.subset)]
-    return np.asarray(np.einsum("tkd,tkd->td", whitened, whitened))

@@ -8,8 +8,8 @@ from scipy import stats
 from calib.discover import LinearProblem, diagnose, fill_missing
 from calib.discover.diagnosis import DRAWS
 from calib.discover.pairs import power, prefers
-from calib.discover.scores import chi_squares
 from calib.discover.tails import log_tail
+from calib.discover.weighing import chi_squares
 
 SEED = 20
 

@@ -1,0 +1,108 @@
+"""Hypotheses whitened: from scores with covariance V to the fall of chi-square by each.
+
+For a hypothesis with scores s ~ N(V beta, V) the vector a = V^-1/2 s has unit covariance, and |a|^2
+is the fall of chi-square if the hypothesis joined the fit. Hypotheses of equally many unknowns are
+whitened together, over all trials at once.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib.arrays import Array, IntArray
+
+BLIND = 1e-8
+"""Directions of which less than this (squared norm after / before projection) is left are lost."""
+WELL_SEEN = 1e-3
+"""Of each direction at least this much (squared) is left: none can be lost, triangles will do."""
+
+
+@dataclass(frozen=True, eq=False)
+class Weighing:
+    """Whitening of one hypothesis at every trial: a = whiten @ s.
+
+    ``whiten`` (T, k, k), rows of directions that are not seen are zero; ``dof`` (T,).
+    """
+
+    subset: tuple[int, ...]
+    whiten: Array
+    dof: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """H hypotheses of k unknowns: ``chosen`` (H, k), ``whiten`` (H, T, k, k), ``dof`` (H, T)."""
+
+    chosen: IntArray
+    whiten: Array
+    dof: Array
+
+    def chi_squares(self, scores: Array) -> Array:
+        """Fall of chi-square (H T, D), from the candidate's scores (T, K, D)."""
+        everything = self.chosen.shape == (1, scores.shape[1])
+        picked = scores[None] if everything else scores[:, self.chosen].swapaxes(0, 1)
+        if self.chosen.shape[1] == 1:
+            squared = (self.whiten[..., 0] * picked[:, :, 0]) ** 2
+        else:
+            whitened = self.whiten @ picked
+            squared = np.einsum("htkd,htkd->htd", whitened, whitened)
+        return np.asarray(squared.reshape(-1, scores.shape[2]))
+
+    def weighings(self) -> list[Weighing]:
+        """One for each hypothesis."""
+        return [
+            Weighing(tuple(map(int, subset)), whiten, dof)
+            for subset, whiten, dof in zip(self.chosen, self.whiten, self.dof, strict=True)
+        ]
+
+
+def stacked(weight: Array, chosen: IntArray) -> Stack:
+    """V^-1/2 of hypotheses (H, k) at every trial, from weights (T, K, K); unseen ones dropped."""
+    count = chosen.shape[1]
+    if count == 1:
+        values = weight[:, chosen[:, 0], chosen[:, 0]].T[:, :, None]
+        seen = values > BLIND
+        inverse = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
+        return Stack(chosen, inverse[..., None], seen.sum(axis=2))
+    blocks = weight[:, chosen[:, :, None], chosen[:, None, :]].swapaxes(0, 1)
+    if (whiten := _triangular(blocks)) is not None:
+        return Stack(chosen, whiten, np.full(blocks.shape[:2], count))
+    values, vectors = np.linalg.eigh(blocks)
+    seen = values > BLIND * count
+    inverse = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)[..., None]
+    return Stack(chosen, np.swapaxes(vectors, -1, -2) * inverse, seen.sum(axis=2))
+
+
+def _triangular(blocks: Array) -> Array | None:
+    """Inverse Cholesky factors of (..., k, k); None if any has a direction that is hardly seen."""
+    try:
+        factors = np.linalg.cholesky(blocks)
+    except np.linalg.LinAlgError:
+        return None
+    smallest = float(np.diagonal(factors, axis1=-2, axis2=-1).min())
+    return np.linalg.inv(factors) if smallest**2 > WELL_SEEN else None
+
+
+def soft_test(weight: Array, size: Array) -> Stack:
+    """The whole group, each direction weighed by how far its unknowns would move the readings.
+
+    With unknowns of standard deviation ``size`` (T, k) the readings see variances v, the
+    eigenvalues of D V D; the most powerful test for such a group is sum w a^2, w = v / (1 + v).
+    Under the null that is near to g times a chi-square with h degrees of freedom, g = sum w^2 /
+    sum w, h = (sum w)^2 / sum w^2 (Satterthwaite 1946); it is divided by g here, and ``dof`` is h.
+    """
+    values, vectors = np.linalg.eigh(weight * size[:, :, None] * size[:, None, :])
+    seen = values > BLIND * np.maximum(values[:, -1:], 1e-300)
+    known = np.where(seen, values, 1.0)
+    worth = np.where(seen, known / (1.0 + known), 0.0)
+    total, squared = worth.sum(axis=1), np.maximum(np.sum(worth**2, axis=1), 1e-300)
+    scale = np.sqrt(worth * (total / squared)[:, None] / known)
+    whiten = np.swapaxes(vectors * size[:, :, None], 1, 2) * scale[:, :, None]
+    whole = np.arange(weight.shape[1], dtype=np.intp)[None]
+    return Stack(whole, whiten[None], np.round(4.0 * total**2 / squared)[None] / 4.0)
+
+
+def chi_squares(weighing: Weighing, scores: Array) -> Array:
+    """Fall of chi-square (T, D) by a hypothesis, from its candidate's scores (T, k, D)."""
+    whitened = weighing.whiten @ scores[:, list(weighing.subset)]
+    return np.asarray(np.einsum("tkd,tkd->td", whitened, whitened))
