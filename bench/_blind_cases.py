@@ -197,6 +197,7 @@ def _plan(case: Case, poses: object) -> RunPlan:
         noise_mm=SIGMA_MM,
         profile=PROFILE,
         prior="normal",
+        delays=True,
     )
 
 
@@ -266,7 +267,6 @@ def build_follow_up(
         parameters=first.parameters,
         profile=profile,
         hidden=Hidden(left),
-        delays=first.plan.delays or first.plan.hidden.has("settling."),
     )
     return simulate(plan)
 
@@ -274,8 +274,8 @@ def build_follow_up(
 def draw_cases(count: int, seed: int, machine: str) -> list[Case]:
     """Equal shares over the catalogue at several sizes, pairs, triples, and unknown ones.
 
-    Every effect comes as often as any other; the set of poses is drawn for each case. Half of the
-    single effects of size 1 are measured at 29 designed poses.
+    Every effect comes as often as any other; the set of poses is drawn for each case, the
+    designed ones for more than half of the single effects of size 1.
     """
     rng = np.random.default_rng([seed, len(machine)])
     absent = ABSENT[machine]

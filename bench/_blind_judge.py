@@ -11,6 +11,8 @@ from calib.discover.run_discovery import RunStage
 from calib.runs.stack import Rows
 
 Vector = np.ndarray
+OTHERWISE_DEFINED = ("frame-shift", "redundancy")
+"""Effects that the mock states by other numbers: about another point, as a stiffness."""
 
 
 @dataclass(frozen=True)
@@ -102,5 +104,5 @@ def pulls(rows: Rows, hidden: dict[str, float], last: RunStage) -> tuple[float, 
     return tuple(
         (values[u.name][0] - hidden.get(u.name, 0.0)) / values[u.name][1]
         for u in unknowns
-        if u.sigma is None and not u.name.startswith("frame-shift")
+        if u.sigma is None and not u.name.startswith(OTHERWISE_DEFINED)
     )

@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Sequence
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -30,20 +31,31 @@ scored.
 """
 
 
-def right(outcome: Any, name: str | None, wanted: Sequence[str]) -> bool:
+Groups = Sequence[Sequence[str]]
+
+
+def right(name: str | None, groups: Groups, wanted: Sequence[str]) -> bool:
     """Whether a name is one of those wanted, or stands in a reported group with one of them."""
     if name is None:
         return False
     if name in wanted:
         return True
-    return any(name in group and set(group) & set(wanted) for group in outcome.groups)
+    return any(name in group and set(group) & set(wanted) for group in groups)
+
+
+def first_right(outcome: Any) -> bool:
+    """Whether the first diagnosis names a hidden effect, or one that it cannot tell from it."""
+    return right(outcome.first, outcome.groups, outcome.case.effects)
 
 
 def both_named(outcome: Any) -> bool:
-    """Whether every hidden effect (or one that cannot be told from it) was found."""
-    return all(
-        any(right(outcome, name, (effect,)) for name in outcome.found)
-        for effect in outcome.case.effects
+    """Whether every hidden effect, or one that cannot be told from it, was found; each its own."""
+    return any(
+        all(
+            right(name, outcome.groups, (effect,))
+            for name, effect in zip(found, outcome.case.effects, strict=True)
+        )
+        for found in permutations(outcome.found, len(outcome.case.effects))
     )
 
 
@@ -83,8 +95,12 @@ def page(outcomes: Sequence[Any], machine: str, seconds: float) -> str:
     declared = [o for o in single if not o.adequate]
     pairs = [o for o in outcomes if len(o.case.effects) == 2]
     visible = [o for o in pairs if o.foreseen and min(f.power for f in o.foreseen) >= 0.9]
-    unknown = [o for o in outcomes if o.case.unknown and o.foreseen]
-    listed = [o for o in unknown if o.foreseen[0].power >= 0.9 and o.foreseen[0].likeness <= 0.7]
+    unknown = [o for o in outcomes if o.case.unknown]
+    listed = [
+        o
+        for o in unknown
+        if o.foreseen and o.foreseen[0].power >= 0.9 and o.foreseen[0].likeness <= 0.7
+    ]
     inside = [abs(pull) < 1.0 for o in outcomes for pull in o.pulls]
     correct = [o for o in outcomes if o.case.effects and set(o.found) == set(o.case.effects)]
     powered = [o.foreseen[0] for o in single if o.foreseen and np.isfinite(o.foreseen[0].power)]
@@ -94,18 +110,22 @@ def page(outcomes: Sequence[Any], machine: str, seconds: float) -> str:
     rows = [
         ("false alarms with nothing hidden", "4..6 %", _share([not o.adequate for o in null])),
         ("right effect first, size 1, 29 designed poses", ">= 75 %",
-         _share([right(o, o.first, o.case.effects) for o in designed])),
+         _share([first_right(o) for o in designed])),
         ("the same after one designed follow-up of 10 poses", ">= 85 %",
-         _share([_right_after(o) for o in designed if o.after])),
+         _share([_right_after(o) for o in designed])),
         ("the same without follow-up, all pose sets", "",
-         _share([right(o, o.first, o.case.effects) for o in size1])),
+         _share([first_right(o) for o in size1])),
         ("the same where the power is 0.9 or more", "",
-         _share([right(o, o.first, o.case.effects) for o in size1
+         _share([first_right(o) for o in size1
                  if o.foreseen and o.foreseen[0].power >= 0.9])),
         ("right effect first among runs in which something was declared", ">= 95 %",
-         _share([right(o, o.first, o.case.effects) for o in declared])),
+         _share([first_right(o) for o in declared])),
         ("right effect first among runs in which one was named", "",
-         _share([right(o, o.first, o.case.effects) for o in named])),
+         _share([first_right(o) for o in named])),
+        ("the same, itself first: no group counted", "",
+         _share([o.first in o.case.effects for o in declared])),
+        ("runs with one effect in which it is said to be like another", "",
+         _share([any(o.first in group for group in o.groups) for o in named])),
         ("two effects at size 2, both named", ">= 80 %",
          _share([both_named(o) for o in pairs])),
         ("the same where the power is 0.9 or more for both", "",
@@ -135,9 +155,9 @@ def page(outcomes: Sequence[Any], machine: str, seconds: float) -> str:
     for o in [*single, *unknown]:
         table[o.case.effects[0], o.case.sizes[0]].append(o)
     for (effect, size), members in sorted(table.items()):
-        hits = sum(right(o, o.first, o.case.effects) for o in members)
+        hits = sum(first_right(o) for o in members)
         none = sum(o.first is None for o in members)
-        wrong = [o.first for o in members if o.first and not right(o, o.first, o.case.effects)]
+        wrong = [o.first for o in members if o.first and not first_right(o)]
         powers = [f.power for o in members for f in o.foreseen[:1]]
         text.append(
             f"| {effect} | {size:g} | {len(members)} | {hits} | "
@@ -161,10 +181,8 @@ def page(outcomes: Sequence[Any], machine: str, seconds: float) -> str:
 
 
 def _right_after(outcome: Any) -> bool:
-    name, groups = outcome.after
-    return right(outcome, name, outcome.case.effects) or any(
-        name in group and outcome.case.effects[0] in group for group in groups
-    )
+    """The same after the follow-up, by the groups of both runs together."""
+    return outcome.after is not None and right(*outcome.after, outcome.case.effects)
 
 
 def _pairs_missed(pairs: Sequence[Any]) -> list[str]:
@@ -173,7 +191,7 @@ def _pairs_missed(pairs: Sequence[Any]) -> list[str]:
     missed: dict[str, list[float]] = defaultdict(list)
     for o in pairs:
         for effect, seen in zip(o.case.effects, o.foreseen, strict=False):
-            if not any(right(o, name, (effect,)) for name in o.found):
+            if not any(right(name, o.groups, (effect,)) for name in o.found):
                 missed[effect].append(seen.power)
     for effect, powers in sorted(missed.items()):
         text.append(f"- {effect}: " + ", ".join(f"{power:.2f}" for power in sorted(powers)))

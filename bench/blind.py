@@ -145,11 +145,11 @@ def _foreseen(
 
 
 def attempt(case: Case) -> Outcome:
-    """Solve a case; one that ends in an error counts as wrong and is listed on the page."""
+    """Solve a case; one that ends in an error counts as wrong, or as an alarm, and is listed."""
     try:
         return solve(case)
     except (BadInput, ValueError, ArithmeticError) as error:
-        return Outcome(case, True, None, (), (), False, float("nan"), False, failure=str(error))
+        return Outcome(case, False, None, (), (), False, float("nan"), False, failure=str(error))
 
 
 def run_all(cases: Sequence[Case], workers: int) -> list[Outcome]:

@@ -75,7 +75,7 @@ class Search:
         before = self.present.run.holdout.rms_mm
         names = (*self.present.effects, name)
         after = self.refit(names).holdout
-        if not math.isfinite(after):
+        if math.isinf(after):
             raise BadInput(
                 f"{name} is not accepted: the readings do not determine a model with it",
                 remedy="Choose another, or measure more",

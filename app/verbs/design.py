@@ -80,6 +80,7 @@ def command(
     report = follow_up_report(plan, discriminate, begin, runs)
     if out is not None:
         given = [f"--model {model}"] * (model is not None) + [f"--add {name}" for name in add]
+        given += [f"--candidates {candidates}"] * (candidates != CANDIDATES)
         out.write_text(_poses_file(plan, report, seed, given), encoding="utf-8")
         answer.say(f"written to {out}")
     answer.show(report, as_json, words(report))

@@ -72,7 +72,7 @@ def words(report: dict[str, Any]) -> str:
     ]
     if report["refused"]:
         refused = ", ".join(report["refused"])
-        lines.append(f"Refused, held-out poses being predicted no better with it: {refused}")
+        lines.append(f"Refused, held-out poses being predicted worse with it: {refused}")
     lines += [
         f"This run cannot tell apart: {', '.join(group)}" for group in report["indistinguishable"]
     ]

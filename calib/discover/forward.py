@@ -6,6 +6,7 @@ what else is missing, it may be drawn away from its value. In the end every effe
 called for beside the others: one that a later effect has made superfluous is taken out.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -75,7 +76,7 @@ def discover(
     Parameters
     ----------
     refit : callable
-        Refits the model with the named effects, diagnoses it and answers a :class:`Stage`.
+        Refits the model with the named effects and answers a :class:`Stage`.
     begin : tuple of str
         Effects in the model at the start.
     keep : sequence of str
@@ -90,7 +91,7 @@ def discover(
         if added is None:
             break
         tried = refit((*now.effects, added))
-        if tried.holdout > now.holdout * (1.0 + SLACK):
+        if math.isinf(tried.holdout) or tried.holdout > now.holdout * (1.0 + SLACK):
             refused.append(added)
             continue
         groups += [group for group in now.diagnosis.indistinguishable if group not in groups]

@@ -54,8 +54,12 @@ class Exploration:
     def close(self, alpha: float) -> bool:
         """Whether any decision is so close that it takes more null draws."""
         decisive = [judged.log_p(index) for judged, index in self.decided()]
-        last = self.rounds[-1]
-        decisive.append(last.log_p(int(np.argmax(last.family.strengths[:, 0]))))
+        last, taken = self.rounds[-1], {index for index, _ in self.chosen}
+        strengths = last.family.strengths[:, 0]
+        effects = [index for index in last.effects if index not in taken]
+        others = range(len(last.effects), strengths.size)
+        strongest = [strengths[list(group)].max() for group in (effects, others) if group]
+        decisive += [last.family.log_p(float(strength)) for strength in strongest]
         low, high = np.log(alpha) + np.log(CLEAR)
         return any(low < log_p < high for log_p in decisive)
 

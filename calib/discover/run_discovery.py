@@ -90,7 +90,7 @@ class Refitter:
         return self._fits[names]
 
     def __call__(self, names: tuple[str, ...]) -> RunStage:
-        """Fit and diagnose; a model that cannot be fitted predicts nothing and so is refused."""
+        """Fit; a model that cannot be fitted predicts nothing and so is refused."""
         if names not in self._stages:
             if self._watch is not None:
                 self._watch(names)

@@ -61,20 +61,8 @@ def discovery_report(discovery: Discovery) -> dict[str, Any]:
         "bad_readings": bad_readings(last.fit),
         "parameters": effect_parameters(last.fit),
         "refused": list(discovery.refused),
-        "advice": _refused(last, discovery.refused) or advice(last),
+        "advice": advice(last, discovery.refused),
     }
-
-
-def _refused(last: RunDiagnosis, refused: Sequence[str]) -> str:
-    """What to do about an effect that is called for and that held-out poses do not confirm."""
-    best = last.diagnosis.best
-    if best is None or best.name not in refused:
-        return ""
-    return (
-        f"{best.name} is called for (p = {best.p_value:.2g}), but held-out poses are predicted no "
-        f"better with it, so it was not added. More poses decide: pkmcal design --discriminate "
-        f"{best.name} nothing"
-    )
 
 
 def _groups(discovery: Discovery) -> list[tuple[str, ...]]:
@@ -152,8 +140,8 @@ def _unexplained(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def advice(found: RunDiagnosis) -> str:
-    """One sentence for the operator: what to do next."""
+def advice(found: RunDiagnosis, refused: Sequence[str] = ()) -> str:
+    """One sentence for the operator: what to do next; ``refused`` by the held-out poses."""
     diagnosis = found.diagnosis
     bad = len(found.fit.bad)
     excluded = f" {_readings(bad)} excluded: see bad_readings." if bad else ""
@@ -179,6 +167,12 @@ def advice(found: RunDiagnosis) -> str:
     if best is None:
         return (
             f"Something is missing that no known effect explains; {_depends(diagnosis)}.{excluded}"
+        )
+    if best.name in refused:
+        return (
+            f"{best.name} is called for (p = {best.p_value:.2g}), but held-out poses would be "
+            "predicted worse with it, so it was not added. More poses decide: pkmcal design "
+            f"--discriminate {best.name} nothing.{excluded}"
         )
     outlook = found.outlook(best)
     says = found.columns_of(best.name).effect.says

@@ -271,6 +271,7 @@ class Model:
                     passive=closed.passive[:, inverse],
                     closed=closed,
                     parameters=parameters,
+                    closing=self._closing(state),
                 ),
             )
         twist = change_of(signatures, "twist", np.zeros((6, rows.count)))

@@ -92,4 +92,4 @@ def test_discover_examples_refused_effects_are_told(capsys):
     report = answer(capsys, "discover", str(RUNS / "no-effect"))
     assert "Refused" not in words(report)
     said = words({**report, "refused": ["screw-twist"]})
-    assert "Refused, held-out poses being predicted no better with it: screw-twist" in said
+    assert "Refused, held-out poses being predicted worse with it: screw-twist" in said

@@ -144,7 +144,7 @@ def test_verb_writes_a_poses_file_that_measure_reads(tmp_path):
          "--candidates", "60", "--add", "gravity-sag", "--out", str(out), "--json"],
     )  # fmt: skip
     assert answer.exit_code == 0, answer.output
-    assert "--discriminate backlash settling --add gravity-sag --n 5" in out.read_text()
+    assert "settling --add gravity-sag --candidates 60 --n 5 --seed 1" in out.read_text()
     report = json.loads(answer.stdout)
     assert report["format"] == "pkm-follow-up/1"
     read = read_pose_file(out, load_machine("hexapod"))
