@@ -21,6 +21,12 @@ LEAST_FALL = 1e-3
 """Fall of chi-square below which nothing is gained by a better step."""
 ENOUGH = 0.8
 """Part of a step at which the cost is least, above which the whole step is taken."""
+STALLED = 1e-4
+"""Two steps that change chi-square by less than this times chi-square per freedom are the last.
+
+Where a large effect is missing the residual bends the valley and steps zigzag in it for ever; a
+hundredth of the uncertainty that such a misfit leaves is near enough.
+"""
 TOLERANCE = 1e-6
 """Steps end when the predicted fall of chi-square is below this, or below 1e-9 of it."""
 
@@ -31,14 +37,14 @@ def optimise(
     """Damped Gauss-Newton; returns the optimum, the covariance of the unknowns and the steps."""
     precision = 1.0 / model.prior**2
     cost = _cost(model, linear, accepted, precision)
-    damping = 0.0
+    damping, stalled = 0.0, 0
     for taken in range(1, MAX_STEPS + 1):
         normal, slope, scale = _normal_equations(model, linear, accepted, precision)
         while True:
             factor = linalg.cho_factor(normal + damping * np.eye(scale.size), lower=True)
             step = scale * linalg.cho_solve(factor, slope)
             fall = float(step @ (slope / scale))
-            if fall <= max(TOLERANCE, 1e-9 * cost):
+            if fall <= max(TOLERANCE, 1e-9 * cost) or stalled == 2:
                 covariance = _inverse(normal) * scale[:, None] * scale
                 return linear, covariance, taken - 1
             trial = _attempt(model, linear, step)
@@ -56,6 +62,8 @@ def optimise(
                     remedy="Check that the run belongs to this machine; see its residuals",
                 )
         damping *= 0.1 if damping > 1e-6 else 0.0
+        worth = cost / (3.0 * accepted.sum())
+        stalled = stalled + 1 if abs(cost - reached) < STALLED * worth else 0
         linear, cost = trial, reached
     raise BadInput(
         f"the fit has not converged in {MAX_STEPS} steps",

@@ -49,8 +49,16 @@ TRIPOD = {
     "thermal-growth": {"thermal-growth.a": 1.2e-5},
     "tracker-scale": {"tracker-scale.k": 1e-4},
 }
+PTM = {
+    "backlash": {"backlash.limb1": 3e-4},
+    "gravity-sag": {"gravity-sag.c": 3e-8},
+    "settling": {"settling.k": 2e-3, "settling.tau": 2.0},
+    "thermal-growth": {"thermal-growth.a": 2e-5},
+    "tracker-scale": {"tracker-scale.k": 1e-4},
+}
 CASES = [("hexapod", effect, hidden) for effect, hidden in sorted(HIDDEN.items())]
 CASES += [("tripod", effect, hidden) for effect, hidden in sorted(TRIPOD.items())]
+CASES += [("ptm", effect, hidden) for effect, hidden in sorted(PTM.items())]
 PROFILE = Profile(rise_K=8.0, payload_kg=(0.0, 12.0, 0.0, 12.0))
 
 
@@ -96,3 +104,26 @@ def test_discover_mock_tilted_joint_moves_the_readings_as_predicted(body, axis):
     seen = np.einsum("ijn,jn->in", rows.whitener, moved)
     assert np.sqrt(np.mean(seen**2)) > 0.05
     np.testing.assert_allclose(predicted, seen, atol=0.02 * np.abs(seen).max())
+
+
+@pytest.mark.parametrize("limb", [1, 2, 3, 4])
+def test_discover_mock_released_limb_is_found_beside_another_effect(limb):
+    """The machine closes with the constraint of one limb gone, near to where it was."""
+    machine = load_machine("ptm")
+    hidden = {"redundancy.limb": float(limb), "redundancy.share": 1.0, "thermal-growth.a": 3e-5}
+    plan = RunPlan(
+        machine="ptm", seed=5, poses=40, noise_mm=0.005, hidden=Hidden(hidden), profile=PROFILE
+    )
+    run = simulate(plan)
+    rows = stack(machine, [parse_run(run_toml(run), points_csv(run), actuators=2)])
+    plain = fit_effects(rows, [])
+    columns = columns_at(plain, effect_named("redundancy", machine), ((float(limb),),))
+    assert (
+        np.max(np.abs(columns.columns)) < 1000.0
+    )  # sigmas of 5 um: millimetres, no other assembly
+    effects = [effect_named(name, machine) for name in ("redundancy", "thermal-growth")]
+    found = fit_effects(rows, effects)
+    values = dict(zip(found.model.names, found.values, strict=True))
+    assert found.chi2_per_dof == pytest.approx(1.0, abs=0.15)
+    assert round(values["redundancy.limb"]) == limb
+    assert values["thermal-growth.a"] == pytest.approx(3e-5, abs=1e-5)
