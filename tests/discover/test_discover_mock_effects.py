@@ -106,13 +106,13 @@ def test_discover_mock_tilted_joint_moves_the_readings_as_predicted(body, axis):
     np.testing.assert_allclose(predicted, seen, atol=0.02 * np.abs(seen).max())
 
 
-@pytest.mark.parametrize("limb", [1, 2, 3, 4])
+@pytest.mark.parametrize("limb", [2, 3])
 def test_discover_mock_released_limb_is_found_beside_another_effect(limb):
     """The machine closes with the constraint of one limb gone, near to where it was."""
     machine = load_machine("ptm")
     hidden = {"redundancy.limb": float(limb), "redundancy.share": 1.0, "thermal-growth.a": 3e-5}
     plan = RunPlan(
-        machine="ptm", seed=5, poses=40, noise_mm=0.005, hidden=Hidden(hidden), profile=PROFILE
+        machine="ptm", seed=5, poses=25, noise_mm=0.005, hidden=Hidden(hidden), profile=PROFILE
     )
     run = simulate(plan)
     rows = stack(machine, [parse_run(run_toml(run), points_csv(run), actuators=2)])
