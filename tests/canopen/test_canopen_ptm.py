@@ -21,7 +21,7 @@ from mocks.physics.truth import draw_parameters
 
 SCALE = 300
 BODY = PtmBody()
-PLACES = [(tilt, azimuth) for azimuth in range(0, 360, 60) for tilt in (8, 25, 42, 55)]
+PLACES = [(tilt, azimuth) for azimuth in range(0, 360, 72) for tilt in (8, 30, 55)]
 POSES = "\n".join(
     [
         'format = "pkm-poses/1"',
