@@ -9,7 +9,7 @@ import click
 from app import answer
 from app.files.models import chosen_effects
 from app.files.runs import read_runs
-from calib.discover.run_discovery import Refitter
+from calib.discover.discovery import Refitter
 from calib.effects import Effect, catalogue
 from calib.runs.stack import Rows, stack
 

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from app.files.machines import read_text
+from app.files.pose_table import Pose
 from app.files.site import Site, load_site
 from app.session.journal import Journal, Row
-from app.session.plan import Plan, Pose
+from app.session.plan import Plan
 from app.session.plans import PlanOptions, measure_plan, order_for
 from calib.arrays import Array
 from calib.errors import BadInput

@@ -3,10 +3,10 @@
 import numpy as np
 
 from bench._blind_cases import build_follow_up
-from calib.discover.forward import Discovery
-from calib.discover.run_design import design_follow_up
-from calib.discover.run_discovery import Refitter, discover_run, stage_of
+from calib.discover.design import design_follow_up
+from calib.discover.discovery import Refitter, discover_run, stage_of
 from calib.effects import catalogue
+from calib.evidence.forward import Discovery
 from calib.runs import parse_run
 from calib.runs.stack import stack
 from mocks.simulate.files import points_csv, run_toml

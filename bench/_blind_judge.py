@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench._blind_cases import Case, displaced
-from calib.discover.evidence import observed
-from calib.discover.pairs import power, prefers
-from calib.discover.run_discovery import RunStage
+from calib.discover.discovery import RunStage
+from calib.evidence.bayes import observed
+from calib.evidence.pairs import power, prefers
 from calib.runs.stack import Rows
 
 Vector = np.ndarray

@@ -24,10 +24,10 @@ from bench._blind_cases import SIGMA_MM, Case, build, draw_cases, draw_nulls
 from bench._blind_follow_up import follow_up, named
 from bench._blind_judge import Foreseen, foreseen, pulls
 from bench._blind_page import INTRODUCTION, page
-from calib.discover.forward import SLACK, Discovery
-from calib.discover.run_discovery import Refitter, discover_run, stage_of
+from calib.discover.discovery import Refitter, discover_run, stage_of
 from calib.effects import catalogue
 from calib.errors import BadInput
+from calib.evidence.forward import SLACK, Discovery
 from calib.mechanism.description import Machine
 from calib.poses.design import design_poses
 from calib.poses.readings import NestReadings

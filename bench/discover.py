@@ -16,17 +16,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from app.files.machines import load_machine
-from calib.discover import LinearProblem, diagnose, structure_candidates
-from calib.discover.run_diagnosis import diagnose_fit
-from calib.discover.run_problem import (
-    effect_candidates,
-    effect_columns,
-    problem_of,
-    quadratics_of,
-    variables_of,
-)
+from calib.discover.diagnosis import diagnose_fit
+from calib.discover.problem import effect_candidates, quadratics_of, variables_of
 from calib.effects import catalogue
+from calib.evidence import LinearProblem, diagnose, structure_candidates
 from calib.identify import Fit, fit
+from calib.identify.signatures import effect_columns
 from calib.model import Model
 from calib.runs import parse_run
 from calib.runs.stack import stack
@@ -43,7 +38,7 @@ def fitted(poses: int) -> Fit:
 
 def false_alarms(found: Fit, count: int) -> float:
     """Part of ``count`` residuals without anything missing that are found inadequate."""
-    problem = problem_of(found)
+    problem = found.problem
     effects = effect_candidates(
         found, problem, effect_columns(found, catalogue(found.model.machine))
     )

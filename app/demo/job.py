@@ -11,12 +11,12 @@ import numpy as np
 from app.analysis import load_rows
 from app.files.fits import read_fit
 from app.files.models import write_model
+from app.files.pose_table import Pose
 from app.files.poses import full_poses, nest_matrix, render_design
 from app.files.site import Site, load_site
 from app.report.build import write_report
 from app.session import PlanOptions, Session, measure_plan
 from app.session import events as ev
-from app.session.plan import Pose
 from app.session.plans import order_for
 from app.session.station import Station
 from app.verification import Verification, judge_session, verification_plan

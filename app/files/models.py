@@ -15,8 +15,8 @@ import tomli_w
 from app.files.runs import read_text
 from calib.arrays import Array
 from calib.effects import Effect, Signature, Situation, Unknown, effect_named, is_shipped
-from calib.effects.operator import effect_from_text
 from calib.errors import BadInput
+from calib.formulas.effect_file import effect_from_text
 from calib.identify import Fit, fit_report
 from calib.mechanism.description import Machine
 from calib.runs.stack import Rows

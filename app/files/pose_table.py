@@ -15,8 +15,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from app.files.machines import read_text
-from app.session.plan import Pose
 from calib.errors import BadInput
+
+Pose = tuple[float, float, float, float, float, float]
+"""x, y, z in mm and rx, ry, rz in rad: the platform in the base frame."""
 
 COLUMNS = ("pose", "x", "y", "z", "rx", "ry", "rz")
 

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from app.files.machines import read_text
-from app.files.pose_table import read_poses
+from app.files.pose_table import Pose, read_poses
 from app.files.toml_reader import TableReader
-from app.session.plan import Pose
 from calib.arrays import Array
 from calib.errors import BadInput
 from calib.mechanism.description import Machine

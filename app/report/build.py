@@ -10,9 +10,9 @@ from app.files.machines import read_text
 from app.report.calibration import Checked, calibration_page
 from app.session.plan import Plan
 from app.verification import FORMAT
-from calib.discover.run_diagnosis import fit_effects
 from calib.errors import BadInput
 from calib.identify import fit_report
+from calib.identify.staged import fit_effects
 
 
 def write_report(

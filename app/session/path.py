@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from app.errors import GateRefused
-from app.session.plan import Plan, Pose
+from app.files.pose_table import Pose
+from app.session.plan import Plan
 from app.session.work import HOME
 from calib.mechanism.description import Machine
 from calib.mechanism.limits import Violation, violations

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from app.files.pose_table import Pose
 from calib.errors import BadInput
 
 FORMAT = "pkm-plan/1"
-Pose = tuple[float, float, float, float, float, float]
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from app.files.pose_table import Pose
 from app.files.site import Site
-from app.session.plan import Plan, PlanWriter, Pose
+from app.session.plan import Plan, PlanWriter
 from calib.errors import BadInput
 
 Order = Literal["nest-by-nest", "pose-by-pose"]

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from app.errors import GateRefused
+from app.files.pose_table import Pose
 from app.files.site import Limits, Site
 from app.session.events import (
     AlarmRaised,
@@ -18,7 +19,7 @@ from app.session.events import (
 )
 from app.session.hands import nobody_to_ask
 from app.session.journal import Journal, NewRow
-from app.session.plan import Plan, Pose
+from app.session.plan import Plan
 from app.session.station import Station
 from calib.arrays import Array
 from calib.frames import Frame, nest_in_base

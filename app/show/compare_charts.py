@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from app.show.charts import ANGLE, LENGTH, save
-from calib.discover.compare import Speaking
+from calib.discover.compare import Comparison
 from calib.discover.compare_report import acts_on, factor_of
-from calib.discover.run_compare import Comparison
+from calib.evidence.compare import Speaking
 
 MOST_PANELS = 6
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from app.analysis import load_rows
 from calib.arrays import Array
-from calib.discover.run_diagnosis import fit_effects
 from calib.identify import Fit, fit_report
+from calib.identify.staged import fit_effects
 from calib.identify.starting import begin
 from calib.model import Model
 

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from app.analysis import load_rows
+from calib.discover.compare import compare_fit
 from calib.discover.compare_report import compare_report
-from calib.discover.forward import SLACK
-from calib.discover.run_compare import compare_fit
-from calib.discover.run_diagnosis import RunDiagnosis
-from calib.discover.run_discovery import SEED, Refitter, discover_run, stage_of
-from calib.discover.run_report import diagnosis_report, effect_parameters
+from calib.discover.diagnosis import RunDiagnosis
+from calib.discover.discovery import SEED, Refitter, discover_run, stage_of
+from calib.discover.report import diagnosis_report, effect_parameters
 from calib.effects import catalogue
 from calib.errors import BadInput
+from calib.evidence.forward import SLACK
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,10 @@ from textual.containers import Horizontal
 from textual.content import Content
 from textual.widgets import Button, Checkbox, Input, RadioButton, RadioSet, Static
 
-from app.files.pose_table import read_poses
+from app.files.pose_table import Pose, read_poses
 from app.files.poses import full_poses, read_pose_file
 from app.files.site import Site
 from app.session import Plan, PlanOptions, measure_plan
-from app.session.plan import Pose
 from app.session.plans import Order
 from app.tui.dialogs import Dialog
 from calib.arrays import Array

@@ -13,11 +13,11 @@ from app import answer
 from app.analysis import load_refitter, model_options
 from app.files.runs import outside_runs
 from app.show.compare_charts import write_charts
+from calib.discover.compare import compare_fit
 from calib.discover.compare_report import compare_report
-from calib.discover.run_compare import compare_fit
-from calib.discover.run_discovery import SEED
-from calib.discover.run_terms import Proposal
-from calib.discover.run_terms import propose as propose_terms
+from calib.discover.discovery import SEED
+from calib.discover.terms import Proposal
+from calib.discover.terms import propose as propose_terms
 
 SHOWN = 6
 WIDTH = 13

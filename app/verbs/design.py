@@ -13,7 +13,7 @@ from app import answer
 from app.analysis import load_refitter, model_options
 from app.files.poses import render_pose_file
 from app.files.runs import outside_runs
-from calib.discover.run_design import CANDIDATES, Plan, design_follow_up
+from calib.discover.design import CANDIDATES, Plan, design_follow_up
 from calib.effects import effect_named
 from calib.errors import BadInput
 from calib.poses.design import labels_for

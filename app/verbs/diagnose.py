@@ -10,7 +10,7 @@ import click
 
 from app import answer
 from app.analysis import load_refitter, model_options
-from calib.discover.run_report import diagnosis_report
+from calib.discover.report import diagnosis_report
 
 
 @click.command()

@@ -13,8 +13,8 @@ from app.analysis import load_refitter, model_options
 from app.files.models import write_model
 from app.files.runs import outside_runs
 from app.verbs.diagnose import bad_lines, sizes, um
-from calib.discover.run_discovery import discover_run, stage_of
-from calib.discover.run_report import discovery_report
+from calib.discover.discovery import discover_run, stage_of
+from calib.discover.report import discovery_report
 
 
 @click.command()

@@ -12,9 +12,9 @@ from app import answer
 from app.analysis import load_rows, model_options
 from app.files.models import write_model
 from app.files.runs import outside_runs
-from calib.discover.run_agreement import runs_at_odds
-from calib.discover.run_diagnosis import fit_effects
+from calib.discover.agreement import runs_at_odds
 from calib.identify import fit_report
+from calib.identify.staged import fit_effects
 
 
 @click.command()

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from app.errors import GateRefused, StoppedByOperator
 from app.files.fits import SavedFit
+from app.files.pose_table import Pose
 from app.session.events import Stage, WriteBackStage
 from app.session.known import Held, Snapshot, compare_with_known
-from app.session.plan import Pose
 from app.session.plans import PlanOptions, measure_plan, order_for
 from app.session.session import Session
 from app.session.station import Station

@@ -1,213 +1,176 @@
-"""Where does the model fail? Structure in the residual against every state variable, in order.
-
-A picture of a dependence is an added-variable picture: the readings are binned by the variable,
-and for all bins together the extension (or displacement) is estimated that the residual asks for,
-b = (A M A^T + 1 / (2 size)^2)^-1 A e with A the carrier in each bin: what the fit could have
-absorbed is accounted for, and the prior of twice the carrier's size stands for what it did absorb.
-Their mean is taken off: a constant is nobody's dependence.
-"""
+"""Compare the model with a run: repeatability, structure against everything, where, which leg."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
-from calib.arrays import Array
-from calib.discover.candidate import Candidate
-from calib.discover.diagnosis import ALPHA, DRAWS
-from calib.discover.evidence import observed
-from calib.discover.family import family
-from calib.discover.problem import LinearProblem
-from calib.discover.quadratic import Quadratic
-from calib.discover.scores import Scores, score
-from calib.discover.structure import Carrier, Variable, structure_candidates
-
-MOST_BINS = 8
-
-
-@dataclass(frozen=True)
-class Bin:
-    """What the residual asks for where the variable is between ``low`` and ``high``."""
-
-    low: float
-    high: float
-    readings: int
-    value: float
-    sigma: float
+from calib.arrays import Array, BoolArray
+from calib.discover.problem import quadratics_of, variables_of
+from calib.evidence.compare import Speaking, Together, compare_structure
+from calib.evidence.repeats import PureError, pure_error
+from calib.evidence.structure import Carrier, Variable
+from calib.identify.fitting import Fit
+from calib.mechanism.rigid import rotate
 
 
 @dataclass(frozen=True, eq=False)
-class Speaking:
-    """How much of the residual depends on one state variable.
+class PoseResidual:
+    """Residuals of M poses, their nests together, as the machine sees them.
 
     Attributes
     ----------
-    channel : str
-    acts_on : str
-        Carrier through which the dependence is strongest; ``axis`` its direction, from 0.
-    unit : str
-        Of the bins' values.
-    p_value : float
-        Family-wise over all variables that were looked at.
-    significant : bool
-    chi2_fall, dof : float, int
-        By the hypothesis with the most evidence.
-    fitted : (R,)
-        Part of the residual that this hypothesis explains, in sigmas.
-    period : float or None
-        Where a periodic dependence is best; bins are then of the variable modulo the period.
-    bins : tuple of Bin
-        Added-variable picture in the direction that shows the most.
+    names : tuple of M str
+    position : (3, M)
+        Platform origin, base frame, mm.
+    shift : (3, M)
+        Mean residual over the nests read at the pose, base frame, mm.
+    extension : (n, M)
+        Error of each actuator that explains the pose's residuals best, in its unit; nan where the
+        readings of a pose cannot tell.
+    q : (n, M)
+        Commanded coordinates.
     """
 
-    channel: str
-    acts_on: str
-    axis: int
-    unit: str
-    p_value: float
-    significant: bool
-    chi2_fall: float
-    dof: int
-    fitted: Array
-    period: float | None
-    bins: tuple[Bin, ...]
+    names: tuple[str, ...]
+    position: Array
+    shift: Array
+    extension: Array
+    q: Array
 
 
-@dataclass(frozen=True)
-class Together:
-    """A test of structure that no single variable shows (neighbours in time, poses as a whole)."""
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A model against a run; ``speaking`` has the state variable with the most structure first.
 
-    channel: str
-    p_value: float
-    significant: bool
-
-
-def compare_structure(
-    problem: LinearProblem,
-    variables: Sequence[Variable],
-    quadratic: Sequence[Quadratic],
-    *,
-    components: int,
-    rng: np.random.Generator,
-    alpha: float = ALPHA,
-) -> tuple[list[Speaking], list[Together]]:
-    """Look at the residual against every variable, the one with the most structure first.
-
-    Parameters
-    ----------
-    problem : LinearProblem
-        Components of a reading are ``R / components`` apart (axis after axis).
-    variables : sequence of Variable
-    quadratic : sequence of Neighbours or Blocks
-    components : int
-        Components of a reading.
-    rng : numpy Generator
-        Draws the null distribution.
+    ``displacement_mm`` is, for each of ``speaking``, the RMS over readings of what depends on it,
+    the share of noise taken off.
     """
-    named = [(variable, found) for variable in variables for found in _candidates(variable)]
-    scores = score(problem, [found for _, found in named], rng, DRAWS)
-    tests = [test.level(scores.residuals) for test in quadratic]
-    levels = [*scores.levels, *tests]
-    if not levels:
-        return [], []
-    joint = family(levels, np.ones(len(levels)))
-    best: dict[str, int] = {}
-    for index, (variable, _) in enumerate(named):
-        known = best.get(variable.name)
-        if known is None or joint.own_log_p[index] < joint.own_log_p[known]:
-            best[variable.name] = index
-    speaking = []
-    for index in sorted(best.values(), key=lambda index: joint.own_log_p[index]):
-        log_p = joint.log_p(float(joint.strengths[index, 0]))
-        speaking.append(_speaking(scores, index, named[index][0], log_p, alpha, components))
-    together = []
-    for number, test in enumerate(quadratic):
-        log_p = joint.log_p(float(joint.strengths[len(named) + number, 0]))
-        together.append(Together(test.channel, _p(log_p), _below(log_p, alpha)))
-    return speaking, together
+
+    fit: Fit
+    repeatability: PureError
+    reference_repeatability: PureError
+    speaking: tuple[Speaking, ...]
+    displacement_mm: tuple[float, ...]
+    together: tuple[Together, ...]
+    poses: PoseResidual
 
 
-def _candidates(variable: Variable) -> list[Candidate]:
-    return structure_candidates([variable])
+def compare_fit(fit: Fit, rng: np.random.Generator) -> Comparison:
+    """Compare a fitted model with its accepted readings."""
+    problem = fit.problem
+    speaking, together = compare_structure(
+        problem, [*_of_machine(fit), *_of_reading(fit)], quadratics_of(fit), components=3, rng=rng
+    )
+    platform = fit.model.rows.on_platform
+    return Comparison(
+        fit=fit,
+        repeatability=_repeats(fit, platform),
+        reference_repeatability=_repeats(fit, ~platform),
+        speaking=tuple(speaking),
+        displacement_mm=tuple(_displacement(fit, one) for one in speaking),
+        together=tuple(together),
+        poses=pose_residuals(fit),
+    )
 
 
-def _p(log_p: float) -> float:
-    return float(np.exp(max(log_p, -690.0)))
+def _of_machine(fit: Fit) -> list[Variable]:
+    """State variables of the diagnosis, the pose's coordinates each by its own name."""
+    names = iter(f"pose {name}" for name in ("x", "y", "z", "rx", "ry", "rz"))
+    found = variables_of(fit)
+    return [replace(one, name=next(names)) if one.name == "pose" else one for one in found]
 
 
-def _below(log_p: float, alpha: float) -> bool:
-    return bool(log_p <= np.log(alpha) + 1e-9)
-
-
-def _speaking(
-    scores: Scores, index: int, variable: Variable, log_p: float, alpha: float, components: int
-) -> Speaking:
-    """Describe the dependence behind one candidate."""
-    candidate = scores.candidates[index]
-    _, parts = observed(scores, index)
-    number = int(np.argmax([part[:, 0].max() for part in parts]))
-    trial = int(np.argmax(parts[number][:, 0]))
-    subset = candidate.hypotheses[number]
-    weighing = scores.weighings[index][number]
-    beta, _ = scores.estimate(index, trial, subset)
-    whitened = weighing.whiten[trial] @ scores.scores[index][trial, list(subset), 0]
-    acts_on = candidate.name.partition("(")[2].rstrip(")").partition(",")[0]
-    carrier = next(each for each in variable.carriers if each.name == acts_on)
-    period = candidate.trials[trial][0] if candidate.trials[trial] else None
-    shown = variable
-    if period is not None:
-        shown = replace(variable, values=np.mod(variable.values, period))
-    pictures = [
-        _binned(scores.problem, shown, carrier, axis, components)
-        for axis in range(carrier.columns.shape[0])
+def _of_reading(fit: Fit) -> list[Variable]:
+    """Variables of the measurement: nest, range, angles of the tracker, size of the last step."""
+    rows, situation, kept = fit.model.rows, fit.linear.situation, fit.accepted
+    count = fit.readings
+    x, y, z = situation.point[:, kept]
+    points = Carrier("point", _flat(np.swapaxes(rows.whitener, 0, 1)[:, :, kept]))
+    turned = np.moveaxis(situation.frame_rotation, 1, 0)
+    platform = [
+        rotate(situation.rotation, axis[:, None] * np.ones(rows.count)) for axis in np.eye(3)
     ]
-    axis = int(np.argmax([sum((b.value / b.sigma) ** 2 for b in bins) for bins in pictures]))
-    return Speaking(
-        channel=variable.name,
-        acts_on=acts_on,
-        axis=axis,
-        unit=carrier.unit,
-        p_value=_p(log_p),
-        significant=_below(log_p, alpha),
-        chi2_fall=float(whitened @ whitened),
-        dof=int(weighing.dof[trial]),
-        fitted=scores.problem.project(beta @ candidate.columns[trial, list(subset)]),
-        period=period,
-        bins=pictures[axis],
+    in_tracker = [np.einsum("jin,jn->in", turned, one) for one in platform]
+    seats = np.stack([np.einsum("ijn,jn->in", rows.whitener, one) for one in in_tracker])
+    seats = seats * rows.on_platform
+    labels = {name: number for number, name in enumerate(dict.fromkeys(rows.nest_name))}
+    nest = np.array([labels[name] for name in rows.nest_name], dtype=np.float64)[kept]
+    unit = rows.machine.actuators[0].unit
+    moved = _flat(situation.actuator_columns[:, :, kept])
+    legs = Carrier("legs", moved, unit, 0.01 if unit == "mm" else 1e-4)
+    found = [
+        Variable("range", np.tile(np.sqrt(x**2 + y**2 + z**2), 3), (points,)),
+        Variable("azimuth", np.tile(np.unwrap(np.arctan2(y, x)), 3), (points,)),
+        Variable("elevation", np.tile(np.arctan2(z, np.hypot(x, y)), 3), (points,)),
+        Variable(
+            "nest", np.tile(nest, 3), (Carrier("seat", _flat(seats[:, :, kept])),), ("levels",)
+        ),
+    ]
+    if np.any(rows.step):
+        found.append(Variable("step", np.tile(rows.step[:, kept], (1, 3)), (legs,)))
+    return [one for one in found if one.values.shape[-1] == 3 * count]
+
+
+def _flat(columns: Array) -> Array:
+    """(c, 3, A) -> (c, 3 A)."""
+    return np.ascontiguousarray(columns.reshape(columns.shape[0], -1))
+
+
+def _repeats(fit: Fit, which: BoolArray) -> PureError:
+    """Repeats of the same pose, nest and direction of approach (reference nests: of the nest)."""
+    rows = fit.model.rows
+    states: list[object] = []
+    for row in np.flatnonzero(fit.accepted):
+        state = (int(rows.run[row]), rows.pose_name[row], rows.nest_name[row])
+        states.append((state, rows.direction[:, row].tobytes()) if which[row] else None)
+    if not which[fit.accepted].any():
+        return PureError(0, float("nan"), float("nan"), 0.0)
+    if not fit.model.rows.on_platform[np.flatnonzero(which)[0]]:
+        states = [state[0] if isinstance(state, tuple) else None for state in states]
+    whitened = fit.linear.whitened[:, fit.accepted]
+    return pure_error(whitened, states, fit.dof)
+
+
+def _displacement(fit: Fit, speaking: Speaking) -> float:
+    """RMS in mm over readings of what a variable explains, less noise's share (dof of chi2)."""
+    factors = np.linalg.inv(np.moveaxis(fit.model.rows.whitener[:, :, fit.accepted], -1, 0))
+    whitened = speaking.fitted.reshape(3, -1)
+    moved = np.einsum("nij,jn->in", factors, whitened)
+    share = max(1.0 - speaking.dof / max(speaking.chi2_fall, 1e-9), 0.0)
+    return float(np.sqrt(share * np.mean(np.sum(moved**2, axis=0))))
+
+
+def pose_residuals(fit: Fit) -> PoseResidual:
+    """Residuals gathered by pose, in the base frame and in the actuators."""
+    rows, situation = fit.model.rows, fit.linear.situation
+    poses = _gathered(fit)
+    columns = situation.actuator_columns
+    n = columns.shape[0]
+    base = np.einsum("jin,jn->in", situation.frame_rotation, fit.linear.residual)
+    extension = np.full((n, len(poses)), np.nan)
+    shift = np.zeros((3, len(poses)))
+    for number, members in enumerate(poses):
+        shift[:, number] = base[:, members].mean(axis=1)
+        own = columns[:, :, members].reshape(n, -1)
+        if own.shape[1] >= n and np.linalg.cond(own @ own.T) < 1e10:
+            whitened = fit.linear.whitened[:, members].reshape(-1)
+            extension[:, number] = np.linalg.solve(own @ own.T, own @ whitened)
+    first = [members[0] for members in poses]
+    return PoseResidual(
+        names=tuple(rows.pose_name[row] for row in first),
+        position=situation.position[:, first],
+        shift=shift,
+        extension=extension,
+        q=rows.q[:, first],
     )
 
 
-def _binned(
-    problem: LinearProblem, variable: Variable, carrier: Carrier, axis: int, components: int
-) -> tuple[Bin, ...]:
-    """Estimates per bin of a variable along one direction of a carrier."""
-    column = carrier.columns[axis]
-    values = variable.values if variable.values.ndim == 1 else variable.values[axis]
-    seen = column != 0.0
-    if not seen.any():
-        return ()
-    edges = _edges(values[seen])
-    inside = np.array([seen & (values >= low) & (values <= high) for low, high in edges])
-    shapes = column * inside
-    weight = shapes @ problem.project(shapes).T + np.eye(len(edges)) / (2.0 * carrier.size) ** 2
-    covariance = np.linalg.inv(weight)
-    centred = np.eye(len(edges)) - 1.0 / len(edges)
-    estimate = centred @ covariance @ (shapes @ problem.residual)
-    covariance = centred @ covariance @ centred
-    readings = np.any(inside.reshape(len(edges), components, -1), axis=1).sum(axis=1)
-    return tuple(
-        Bin(float(low), float(high), int(count), float(value), float(np.sqrt(variance)))
-        for (low, high), count, value, variance in zip(
-            edges, readings, estimate, np.diag(covariance), strict=True
-        )
-    )
-
-
-def _edges(values: Array) -> list[tuple[float, float]]:
-    """Limits of bins with about equally many readings; one for each value if they are few."""
-    distinct = np.unique(values)
-    if distinct.size <= MOST_BINS:
-        return [(value, value) for value in distinct]
-    ranks = np.linspace(0, distinct.size, MOST_BINS + 1).astype(int)
-    return [(distinct[first], distinct[last - 1]) for first, last in pairwise(ranks)]
+def _gathered(fit: Fit) -> Sequence[list[int]]:
+    """Accepted platform readings of each pose: same run, label and commanded coordinates."""
+    rows = fit.model.rows
+    poses: dict[tuple[int, str, bytes], list[int]] = {}
+    for row in np.flatnonzero(fit.accepted & rows.on_platform):
+        key = (int(rows.run[row]), rows.pose_name[row], rows.q[:, row].tobytes())
+        poses.setdefault(key, []).append(int(row))
+    return list(poses.values())

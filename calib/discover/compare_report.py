@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from calib.discover.compare import Speaking
-from calib.discover.repeats import PureError
-from calib.discover.run_compare import Comparison
+from calib.discover.compare import Comparison
+from calib.evidence.compare import Speaking
+from calib.evidence.repeats import PureError
 
 
 def compare_report(found: Comparison) -> dict[str, Any]:

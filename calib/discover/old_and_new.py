@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.arrays import Array
-from calib.discover.candidate import Candidate
 from calib.discover.follow_up import FollowUp, own_to_each_run
-from calib.discover.next_experiment import Blocks, Separation
-from calib.discover.run_problem import EffectColumns
 from calib.effects.component import Effect
+from calib.evidence.candidate import Candidate
+from calib.evidence.next_experiment import Blocks, Separation
 from calib.identify.fitting import Fit
+from calib.identify.signatures import EffectColumns
 from calib.model.columns import at_trial
 from calib.runs.stack import Rows
 

@@ -1,145 +1,108 @@
-"""A fit as the discovery core sees it: residual, derivatives and priors, all in sigmas.
+"""A fit to a run as the linear core sees it: effects as candidates, state variables.
 
-Near its optimum the model reads y = J^T theta + A^T beta + eps with eps ~ N(0, I), the fitted
-unknowns theta with prior precision Lambda (zero where there is no prior) and the candidate's
-unknowns beta. With N = J J^T + Lambda = L L^T and G = L^-1 J the residual of the fit is
-
-    e = M (y - f(prior mean)),      M = I - J^T N^-1 J = I - G^T G.
-
-Under "nothing is missing" the truth is drawn from its prior and y - f has covariance
-I + J^T Lambda^-1 J = M^-1 (Woodbury), so that
-
-    e ~ N(0, M)    and    A e ~ N(A M A^T beta, A M A^T)
-
-exactly: M is the marginal weight of the readings after geometry, frames and effects already in
-have taken what they can. It is never formed; G, of p rows, stands for it.
+Components are ordered as (3, A) flattened: axis after axis over the accepted readings.
 """
 
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Sequence
 
 import numpy as np
-from scipy import linalg
 
 from calib.arrays import Array
+from calib.effects.tracker import rigid_motions
+from calib.evidence.candidate import Candidate, Term, fill_missing
+from calib.evidence.problem import LinearProblem
+from calib.evidence.quadratic import Neighbours, Quadratic, blocks_of
+from calib.evidence.structure import Carrier, Variable
+from calib.identify.fitting import Fit
+from calib.identify.signatures import EffectColumns
+from calib.mechanism.rigid import rotate, to_euler
 
-VANISHING = 1e-10
-"""Eigenvalues of the scaled J J^T below this times the largest are directions not seen at all."""
+
+def effect_candidates(
+    fit: Fit, problem: LinearProblem, effects: Sequence[EffectColumns]
+) -> list[Candidate]:
+    """Effects as candidates over the accepted readings, in the order of ``effects``."""
+    return [_candidate(fit, problem, one) for one in effects]
 
 
-@dataclass(frozen=True, eq=False)
-class LinearProblem:
-    """A linearised fit of R whitened readings' components with p fitted unknowns.
+def _candidate(fit: Fit, problem: LinearProblem, one: EffectColumns) -> Candidate:
+    columns = _accepted(fit, one.columns)
+    missing = np.tile(~one.known[fit.accepted], 3)
+    if missing.any():
+        columns = fill_missing(problem, columns, missing)
+    terms = tuple(Term(u.name, u.unit, u.size, u.sigma) for u in one.unknowns if not u.nonlinear)
+    subsets = one.effect.parts(fit.model.rows)
+    return Candidate(one.effect.id, terms, columns, one.trials, subsets=subsets)
 
-    Attributes
-    ----------
-    residual : (R,)
-        Measured minus predicted at the optimum, in sigmas.
-    jacobian : (p, R)
-        Derivatives of the prediction by the fitted unknowns, in sigmas per unit.
-    prior_precision : (p,)
-        1 / sigma^2 of the priors; zero for unknowns without one (frames).
-    """
 
-    residual: Array
-    jacobian: Array
-    prior_precision: Array
+def _accepted(fit: Fit, columns: Array) -> Array:
+    """(..., 3, N) -> (..., 3 A), contiguous."""
+    chosen = columns if fit.accepted.all() else columns[..., fit.accepted]
+    return np.ascontiguousarray(chosen.reshape(*columns.shape[:-2], -1))
 
-    def __post_init__(self) -> None:
-        p, rows = self.jacobian.shape
-        if self.residual.shape != (rows,) or self.prior_precision.shape != (p,):
-            raise ValueError(
-                f"shapes do not fit: residual {self.residual.shape}, jacobian"
-                f" {self.jacobian.shape}, prior_precision {self.prior_precision.shape}"
-            )
 
-    @property
-    def rows(self) -> int:
-        """Number R of whitened components."""
-        return self.residual.size
+def _rows_of(fit: Fit, values: Array) -> Array:
+    """State column (..., N) -> value of each component (..., 3 A)."""
+    chosen = values[..., fit.accepted]
+    return np.concatenate([chosen] * 3, axis=-1)
 
-    @cached_property
-    def _factor(self) -> tuple[Array, Array]:
-        """Lower Cholesky factor of N scaled to a unit diagonal, and the scale (p,)."""
-        normal = self.jacobian @ self.jacobian.T
-        normal[np.diag_indices_from(normal)] += self.prior_precision
-        diagonal = np.diag(normal)
-        scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-        scaled = normal * scale[:, None] * scale
-        # 1e-12 keeps unknowns that neither data nor prior determine from stopping the diagnosis
-        scaled[np.diag_indices_from(scaled)] += 1e-12
-        return linalg.cholesky(scaled, lower=True), scale
 
-    @cached_property
-    def absorbed(self) -> Array:
-        """G (p, R): M = I - G^T G."""
-        factor, scale = self._factor
-        return np.asarray(
-            linalg.solve_triangular(factor, scale[:, None] * self.jacobian, lower=True)
-        )
+def variables_of(fit: Fit) -> list[Variable]:
+    """Everything that the residual could depend on, with what it could act on."""
+    rows, situation = fit.model.rows, fit.linear.situation
+    columns = _accepted(fit, situation.actuator_columns)
+    unit = rows.machine.actuators[0].unit if rows.machine.actuators else "mm"
+    size = 0.01 if unit == "mm" else 1e-4
+    legs = Carrier("legs", columns, unit, size)
+    own = [Carrier(f"leg{k + 1}", columns[[k]], unit, size) for k in range(columns.shape[0])]
+    points = Carrier("point", _accepted(fit, np.swapaxes(rows.whitener, 0, 1)), "mm", 0.01)
+    found = [
+        Variable(f"q{k + 1}", _rows_of(fit, s), (leg,), ("smooth", "periodic"), _shortest(unit))
+        for k, (s, leg) in enumerate(zip(rows.extension, own, strict=True))
+    ]
+    found.append(Variable("direction", _rows_of(fit, rows.direction), (legs,)))
+    found.append(
+        Variable("time_s", _rows_of(fit, rows.time_s), (legs, points), ("smooth", "periodic"))
+    )
+    found += [
+        Variable(name, _rows_of(fit, values), (legs, points))
+        for name, values in rows.channels.items()
+        if np.isfinite(values[fit.accepted]).all()
+    ]
+    found += [
+        Variable(name, _rows_of(fit, values), (points,))
+        for name, values in zip("xyz", situation.point, strict=True)
+    ]
+    coordinates = np.concatenate([situation.position, to_euler(situation.rotation)])
+    found += [Variable("pose", _rows_of(fit, values), (legs,)) for values in coordinates]
+    return found
 
-    def whitened_step(self, slope: Array) -> Array:
-        """L^-1 slope (p,): a step of the fitted unknowns moves the prediction by G^T times it."""
-        factor, scale = self._factor
-        return np.asarray(linalg.solve_triangular(factor, scale * slope, lower=True))
 
-    @cached_property
-    def trace(self) -> float:
-        """tr M = R - tr H, the degrees of freedom left."""
-        return float(self.rows - np.sum(self.absorbed**2))
+def _shortest(unit: str) -> float:
+    """Shortest period along an actuator that is tried: a millimetre, or a degree and a bit."""
+    return 1.0 if unit == "mm" else 2.0 * np.pi / 200.0
 
-    @cached_property
-    def _column_space(self) -> Array:
-        """Orthonormal rows (rank, R) that span the rows of J, priors left aside."""
-        size = np.sqrt(np.sum(self.jacobian**2, axis=1))
-        unit = self.jacobian / np.where(size > 0.0, size, 1.0)[:, None]
-        values, vectors = linalg.eigh(unit @ unit.T)
-        seen = values > VANISHING * max(float(values[-1]), VANISHING) if values.size else values > 0
-        return np.asarray((vectors[:, seen] / np.sqrt(values[seen])).T @ unit)
 
-    def project(self, columns: Array) -> Array:
-        """What of ``columns`` (..., R) is left for a candidate: columns @ M."""
-        return np.asarray(columns - (columns @ self.absorbed.T) @ self.absorbed)
-
-    def visible(self, columns: Array) -> float:
-        """Norm of ``columns`` (k, R) after projecting out everything fitted, over its norm before.
-
-        A ratio of norms, without priors: what a fit with free geometry could have absorbed is
-        gone. For several columns, in units of their sizes, Frobenius norms are compared; so it is
-        a property of the run, not of the noise. Answers 0 for columns that are zero.
-        """
-        before = float(np.sum(columns**2))
-        if before == 0.0:
-            return 0.0
-        within = columns @ self._column_space.T
-        return float(np.sqrt(max(before - float(np.sum(within**2)), 0.0) / before))
-
-    def null_residuals(self, draws: int, rng: np.random.Generator) -> Array:
-        """Residuals (R, draws) of fits in which nothing is missing, e ~ N(0, M).
-
-        By perturbation: e = eps - J^T N^-1 (J eps + Lambda^1/2 xi), whose covariance is
-        I - 2 J^T N^-1 J + J^T N^-1 N N^-1 J = M.
-        """
-        factor, scale = self._factor
-        noise = rng.standard_normal((self.rows, draws))
-        prior = np.sqrt(self.prior_precision)[:, None] * rng.standard_normal(
-            (self.prior_precision.size, draws)
-        )
-        pulled = self.absorbed @ noise + linalg.solve_triangular(
-            factor, scale[:, None] * prior, lower=True
-        )
-        return np.asarray(noise - self.absorbed.T @ pulled)
-
-    def with_columns(self, columns: Array, precision: Array) -> "LinearProblem":
-        """Let the fit take ``columns`` (k, R) too, with prior ``precision`` (k,); relinearised.
-
-        The residual becomes that of the larger fit to first order.
-        """
-        projected = self.project(columns)
-        weight = columns @ projected.T + np.diag(precision)
-        beta = np.linalg.lstsq(weight, columns @ self.residual, rcond=1e-12)[0]
-        return LinearProblem(
-            residual=self.residual - projected.T @ beta,
-            jacobian=np.concatenate([self.jacobian, columns]),
-            prior_precision=np.concatenate([self.prior_precision, precision]),
-        )
+def quadratics_of(fit: Fit) -> list[Quadratic]:
+    """Neighbours in time that err alike, poses that move as one."""
+    rows, situation = fit.model.rows, fit.linear.situation
+    count = fit.readings
+    run, time = rows.run[fit.accepted], rows.time_s[fit.accepted]
+    platform = rows.on_platform[fit.accepted]
+    pair = np.flatnonzero(
+        (run[1:] == run[:-1]) & (time[1:] > time[:-1]) & platform[1:] & platform[:-1]
+    )
+    found: list[Quadratic] = []
+    if pair.size >= 10:
+        axes = count * np.arange(3)[:, None]
+        found.append(Neighbours((axes + pair).reshape(-1), (axes + pair + 1).reshape(-1)))
+    motions = rigid_motions(situation.base_point - situation.position)
+    turned = np.stack([rotate(situation.frame_rotation, one) for one in motions])
+    whitened = np.einsum("ijn,ujn->uin", rows.whitener, turned)
+    labels = [
+        f"{run} {name}" if on else ""
+        for run, name, on in zip(rows.run, rows.pose_name, rows.on_platform, strict=True)
+    ]
+    kept = [label for label, accepted in zip(labels, fit.accepted, strict=True) if accepted]
+    blocks = blocks_of(kept * 3, _accepted(fit, whitened))
+    return [*found, blocks] if blocks is not None else found

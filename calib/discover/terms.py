@@ -1,155 +1,198 @@
-"""Propose terms for what no known effect explains: sparse, and stable under resampling.
+"""A library of formulas for a run, and the proposal of an operator's effect from it.
 
-A library of small formulas is offered. The one with the most evidence joins the fit, the residual
-is looked at again, and so on until none adds more than e^3 (sparse regression by forward
-selection; the evidence pays for a formula's number of unknowns and of trials). The selection is
-repeated on complementary halves of the poses (Shah and Samworth 2013): a term is stable if it, or
-one that the readings cannot tell from it, is selected in most halves.
-
-A half S of the readings has its own fit: with slope J_S e_S - J e (the gradient of the part left
-out, priors included) its residual is e_S - J_S^T N_S^-1 (J_S e_S - J e).
+Every formula of the library is an effect file's (``calib.formulas.effect_file``), so that what is
+proposed can be saved, read and refined by hand. Variables are centred and scaled in the formulas
+themselves where that keeps numbers readable.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from calib.arrays import Array, BoolArray, IntArray
-from calib.discover.candidate import Candidate
-from calib.discover.evidence import observed
-from calib.discover.problem import LinearProblem
-from calib.discover.rounds import joining
-from calib.discover.scores import Scores, score
+from calib.arrays import IntArray
+from calib.discover.problem import effect_candidates
+from calib.evidence.terms import Selected, select_terms
+from calib.formulas.effect_file import effect_from_text
+from calib.formulas.formula_effect import OperatorEffect
+from calib.identify.fitting import Fit
+from calib.identify.signatures import effect_columns
 
-ENOUGH = 3.0
-"""Log evidence that a term must add."""
-PAIRS = 12
-"""Complementary pairs of halves."""
-STABLE = 0.6
-"""Part of the halves in which a term must be selected."""
-ALIKE = 0.9
-"""Projected cosine above which one term stands for another."""
-MOST_TERMS = 3
+PERIODS = 48
+
+
+@dataclass(frozen=True)
+class Formula:
+    """One entry of the library.
+
+    ``text`` holds the unknowns as ``{a}``, ``{b}`` ... with ``units``; ``searched`` is a nonlinear
+    unknown as (name, unit, from, to) or None.
+    """
+
+    text: tuple[str, ...]
+    units: tuple[str, ...]
+    acts_on: str
+    shared: bool
+    searched: tuple[str, str, float, float] | None = None
+
+    def table(self, identifier: str, says: str, letters: Sequence[str]) -> str:
+        """The formula as the text of an effect file."""
+        names = dict(zip("abc", letters, strict=False))
+        parts = [f'"{one.format(**names)}"' for one in self.text]
+        unknowns = [f'{x} = "{unit}"' for x, unit in zip(letters, self.units, strict=False)]
+        if self.searched is not None:
+            name, unit, low, high = self.searched
+            unknowns.append(
+                f'{name} = {{ unit = "{unit}", from = {low:.6g}, to = {high:.6g}, '
+                f"steps = {PERIODS} }}"
+            )
+        lines = [
+            "[effect]",
+            f'id = "{identifier}"',
+            f'says = "{says}"',
+            f'acts_on = "{self.acts_on}"',
+            f"expression = {parts[0] if len(parts) == 1 else '[' + ', '.join(parts) + ']'}",
+            f"unknowns = {{ {', '.join(unknowns)} }}",
+        ]
+        return "\n".join([*lines, *(["shared = true"] if self.shared else [])]) + "\n"
 
 
 @dataclass(frozen=True, eq=False)
-class Selected:
-    """A term that the readings call for.
+class Proposal:
+    """A term for what is left, as an operator's effect file.
 
     Attributes
     ----------
-    index : int
-        Its place in the library.
-    log_evidence : float
-        What it added when it was selected.
-    frequency : float
-        Part of the halves of the poses in which it, or one like it, was selected.
-    trial : tuple of float
-        Values of its nonlinear unknowns.
-    fitted : (R,)
-        Part of the residual that it explains, in sigmas.
+    formula : str
+        For people.
+    text : str
+        The effect file.
+    selected : Selected
+        Evidence and stability.
+    explains_mm : float
+        RMS over readings of what it explains.
     """
 
-    index: int
-    log_evidence: float
-    frequency: float
-    trial: tuple[float, ...]
-    fitted: Array
-
-    @property
-    def stable(self) -> bool:
-        """Whether most halves call for it."""
-        return self.frequency >= STABLE
+    formula: str
+    text: str
+    selected: Selected
+    explains_mm: float
 
 
-def select_terms(
-    problem: LinearProblem,
-    library: Sequence[Candidate],
-    poses: IntArray,
-    rng: np.random.Generator,
-    *,
-    pairs: int = PAIRS,
-) -> list[Selected]:
-    """Select terms, in the order in which they were called for.
-
-    Parameters
-    ----------
-    problem : LinearProblem
-        The fit as it is.
-    library : sequence of Candidate
-        Terms; one may have several unknowns and trials.
-    poses : (R,)
-        Number of the pose of each component, from 0; -1 for readings that are in every half.
-    rng : numpy Generator
-        Draws the halves.
-    """
-    chosen, signatures = _forward(problem, library, rng)
-    if not chosen:
-        return []
-    votes = np.zeros(len(chosen))
-    count = int(poses.max()) + 1
-    for _ in range(pairs):
-        first = rng.permutation(count)[: count // 2]
-        inside = np.isin(poses, first)
-        for half in (inside | (poses < 0), ~inside):
-            found, others = _forward(*_half(problem, library, half), rng)
-            for number, signature in enumerate(signatures):
-                votes[number] += any(
-                    index == chosen[number][0] or _alike(problem, signature, other, half)
-                    for (index, _, _), other in zip(found, others, strict=True)
-                )
-    return [
-        Selected(index, evidence, float(vote) / (2 * pairs), trial, problem.project(signature))
-        for (index, evidence, trial), vote, signature in zip(chosen, votes, signatures, strict=True)
+def library(fit: Fit) -> list[Formula]:
+    """Formulas in actuator space (one for all, or one each) and in point space."""
+    rows = fit.model.rows
+    unit = rows.machine.actuators[0].unit if rows.machine.actuators else "mm"
+    own = [
+        (("{a} * s**2",), (f"1/{unit}",)),
+        (("{a} * s**3",), (f"1/{unit}^2",)),
+        (("{a} * abs(s)",), ("1",)),
+        (("{a} * direction",), (unit,)),
+        (("{a} * s * direction",), ("1",)),
+        (("{a} * step",), ("1",)),
+        (("{a} * s**2 * direction",), (f"1/{unit}",)),
     ]
+    found = [
+        Formula(text, units, "actuator", shared) for text, units in own for shared in (True, False)
+    ]
+    for name, low, high in _varying(fit):
+        centre = f"({name} - {0.5 * (low + high):.6g})"
+        found += _of_channel(centre, name, unit)
+    found += _of_time(fit, unit)
+    for text in ("range**2", "range**3", "elevation", "elevation**2", "sin(2*azimuth)"):
+        found.append(Formula((f"{{a}} * {text}",), ("mm",), "point", True))
+    waves = ("sin(azimuth)", "cos(azimuth)", "sin(2*azimuth)", "cos(2*azimuth)", "elevation**2")
+    found += [_along(one, "mm") for one in waves]
+    return found
 
 
-def _half(
-    problem: LinearProblem, library: Sequence[Candidate], half: BoolArray
-) -> tuple[LinearProblem, list[Candidate]]:
-    """The problem and the library on some of the components."""
-    jacobian = problem.jacobian[:, half]
-    slope = jacobian @ problem.residual[half] - problem.jacobian @ problem.residual
-    empty = LinearProblem(problem.residual[half], jacobian, problem.prior_precision)
-    residual = problem.residual[half] - empty.absorbed.T @ empty.whitened_step(slope)
-    own = [replace(one, columns=np.ascontiguousarray(one.columns[:, :, half])) for one in library]
-    return LinearProblem(residual, jacobian, problem.prior_precision), own
+def _along(shape: str, unit: str) -> Formula:
+    """A displacement of the point in any fixed direction of the tracker frame."""
+    text = tuple(f"{{{x}}} * {shape}" for x in "abc")
+    return Formula(text, (unit,) * 3, "point", True)
 
 
-def _forward(
-    problem: LinearProblem, library: Sequence[Candidate], rng: np.random.Generator
-) -> tuple[list[tuple[int, float, tuple[float, ...]]], list[Array]]:
-    """Forward selection: (term, evidence, trial) in order, and the terms' signatures (R,)."""
-    scores = score(problem, library, rng, 0)
-    found: list[tuple[int, float, tuple[float, ...]]] = []
-    signatures: list[Array] = []
-    while len(found) < MOST_TERMS:
-        taken = {index for index, _, _ in found}
-        left = [index for index in range(len(library)) if index not in taken]
-        if not left:
-            break
-        best = max(left, key=lambda index: observed(scores, index)[0])
-        evidence, parts = observed(scores, best)
-        if evidence < ENOUGH:
-            break
-        trial = int(np.argmax(parts[0][:, 0]))
-        signatures.append(_signature(scores, best, trial))
-        found.append((best, evidence, library[best].trials[trial]))
-        scores = scores.without(*joining(scores, best), rng)
-    return found, signatures
+def _varying(fit: Fit) -> list[tuple[str, float, float]]:
+    """Channels that vary, with their range."""
+    found = []
+    for name, values in fit.model.rows.channels.items():
+        known = values[fit.accepted & np.isfinite(values)]
+        if known.size and np.ptp(known) > 1e-9 * max(1.0, float(np.abs(known).max())):
+            found.append((name, float(known.min()), float(known.max())))
+    return found
 
 
-def _signature(scores: Scores, index: int, trial: int) -> Array:
-    beta, _ = scores.estimate(index, trial, scores.candidates[index].hypotheses[0])
-    return np.asarray(beta @ scores.candidates[index].columns[trial])
+def _of_channel(centre: str, name: str, unit: str) -> list[Formula]:
+    per = f"{unit} per unit of {name}"
+    found = [
+        Formula((text,), (per,), "actuator", shared)
+        for text in (f"{{a}} * {centre}", f"{{a}} * {centre} * s", f"{{a}} * {centre}**2")
+        for shared in (True, False)
+    ]
+    return [*found, _along(centre, f"mm per unit of {name}")]
 
 
-def _alike(problem: LinearProblem, signature: Array, other: Array, half: BoolArray) -> bool:
-    """Whether two signatures move the readings of a half alike once geometry has had its share."""
-    padded = np.zeros(half.size)
-    padded[half] = other
-    one = problem.project(np.where(half, signature, 0.0))
-    two = problem.project(padded)
-    norm = float(np.linalg.norm(one) * np.linalg.norm(two))
-    return norm > 0.0 and abs(float(one @ two)) > ALIKE * norm
+def _of_time(fit: Fit, unit: str) -> list[Formula]:
+    """Waves and warming-up in time, where the run lasts long enough to see them."""
+    time = np.unique(fit.model.rows.time_s[fit.accepted])
+    span = float(np.ptp(time))
+    if time.size < 12 or span <= 0.0:
+        return []
+    low = max(4.0 * span / time.size, span / (0.5 * PERIODS))
+    period = ("p", "s", low, span)
+    wave = "{a} * sin(2*pi*t/p) + {b} * cos(2*pi*t/p)"
+    decay = ("tau", "s", span / 20.0, span)
+    found = [Formula((wave,), (unit, unit), "actuator", shared, period) for shared in (True, False)]
+    found += [
+        Formula(("{a} * exp(-t/tau)",), (unit,), "actuator", shared, decay)
+        for shared in (True, False)
+    ]
+    for axis in range(3):
+        along = ["0", "0", "0"]
+        along[axis] = wave
+        found.append(Formula(tuple(along), ("mm", "mm"), "point", True, period))
+    return found
+
+
+def propose(fit: Fit, rng: np.random.Generator) -> list[Proposal]:
+    """Propose terms for what a fit leaves, in the order in which they are called for."""
+    formulas = library(fit)
+    effects: list[OperatorEffect] = []
+    kept: list[Formula] = []
+    for number, formula in enumerate(formulas):
+        effect = effect_from_text(formula.table(f"term-{number}", "a term", "abc"), "library")
+        if not effect.unavailable(fit.model.rows):
+            effects.append(effect)
+            kept.append(formula)
+    problem = fit.problem
+    candidates = effect_candidates(fit, problem, effect_columns(fit, effects))
+    found = select_terms(problem, candidates, _poses(fit), rng)
+    return [_proposal(fit, kept[one.index], number, one) for number, one in enumerate(found)]
+
+
+def _poses(fit: Fit) -> IntArray:
+    """Number of the pose of each component (3 A,), -1 for reference readings."""
+    rows = fit.model.rows
+    names = [
+        (int(run), name) if on else None
+        for run, name, on in zip(rows.run, rows.pose_name, rows.on_platform, strict=True)
+    ]
+    numbers = {name: k for k, name in enumerate(dict.fromkeys(n for n in names if n is not None))}
+    one = np.array([-1 if name is None else numbers[name] for name in names])[fit.accepted]
+    return np.tile(one.astype(np.intp), 3)
+
+
+def _proposal(fit: Fit, formula: Formula, number: int, found: Selected) -> Proposal:
+    factors = np.linalg.inv(np.moveaxis(fit.model.rows.whitener[:, :, fit.accepted], -1, 0))
+    moved = np.einsum("nij,jn->in", factors, found.fitted.reshape(3, -1))
+    said = ", ".join(one.format(a="a", b="b", c="c") for one in formula.text)
+    says = f"proposed from the residual: {said}"
+    if found.trial:
+        name = formula.searched[0] if formula.searched else "x"
+        said += f" with {name} near {found.trial[0]:.4g}"
+    return Proposal(
+        formula=said,
+        text=formula.table(f"found-{number + 1}", says, "abc"),
+        selected=found,
+        explains_mm=float(np.sqrt(np.mean(np.sum(moved**2, axis=0)))),
+    )

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from calib.arrays import Array, BoolArray
+from calib.evidence.problem import LinearProblem
 from calib.identify.optimum import optimise
 from calib.identify.readings import BadReading, strays
 from calib.identify.starting import bad_reading, begin
@@ -57,6 +58,11 @@ class Fit:
     def prior_precision(self) -> Array:
         """1 / sigma^2 of the priors (p,)."""
         return 1.0 / self.model.prior**2
+
+    @property
+    def problem(self) -> LinearProblem:
+        """The fit as a linear problem over its accepted readings."""
+        return LinearProblem(self.whitened, self.jacobian, self.prior_precision)
 
     @cached_property
     def values(self) -> Array:

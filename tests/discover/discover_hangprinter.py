@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
-from calib.discover import Candidate, LinearProblem, Term, fill_missing
+from calib.evidence import Candidate, LinearProblem, Term, fill_missing
 
 FILE = Path(__file__).parents[1] / "data" / "real" / "hangprinter" / "hp4_force_series2.json"
 SIGMA = 1.03

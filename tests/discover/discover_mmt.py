@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from calib.discover import Candidate, LinearProblem, Term
+from calib.evidence import Candidate, LinearProblem, Term
 
 FILE = Path(__file__).parents[1] / "data" / "real" / "mmt" / "k_and_e.dat"
 SIGMA = 0.65

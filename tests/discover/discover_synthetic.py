@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.discover import (
+from calib.evidence import (
     Candidate,
     Carrier,
     Diagnosis,
@@ -13,7 +13,7 @@ from calib.discover import (
     Variable,
     structure_candidates,
 )
-from calib.discover.quadratic import Neighbours
+from calib.evidence.quadratic import Neighbours
 
 POSES = 45
 

@@ -5,11 +5,11 @@ import pytest
 from discover_synthetic import POSES, Lab
 from scipy import stats
 
-from calib.discover import LinearProblem, diagnose, fill_missing
-from calib.discover.diagnosis import DRAWS
-from calib.discover.pairs import power, prefers
-from calib.discover.tails import log_tail
-from calib.discover.weighing import chi_squares
+from calib.evidence import LinearProblem, diagnose, fill_missing
+from calib.evidence.diagnosis import DRAWS
+from calib.evidence.pairs import power, prefers
+from calib.evidence.tails import log_tail
+from calib.evidence.weighing import chi_squares
 
 SEED = 20
 

@@ -11,10 +11,10 @@ from discover_synthetic import POSES, Lab
 
 from app.files.runs import read_runs
 from app.verbs.compare import command
-from calib.discover import Carrier, Variable, pure_error
-from calib.discover.compare import compare_structure
-from calib.discover.run_compare import compare_fit, pose_residuals
-from calib.effects.operator import effect_from_text
+from calib.discover.compare import compare_fit, pose_residuals
+from calib.evidence import Carrier, Variable, pure_error
+from calib.evidence.compare import compare_structure
+from calib.formulas.effect_file import effect_from_text
 from calib.identify import fit
 from calib.model import Model
 from calib.runs.stack import stack

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from discover_synthetic import Lab, Refitted
 
-from calib.discover import diagnose, discover
+from calib.evidence import diagnose, discover
 
 
 class Refit:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from discover_synthetic import Refitted
 
-from calib.discover import diagnose, discover
+from calib.evidence import diagnose, discover
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import discover_mmt as mmt
 import numpy as np
 import pytest
 
-from calib.discover import diagnose
+from calib.evidence import diagnose
 
 LADDER = [
     # fitted, RMS in arc seconds, who must come first, share of what is left that it explains

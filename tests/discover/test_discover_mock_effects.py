@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from app.files.machines import load_machine
-from calib.discover.run_diagnosis import fit_effects
-from calib.discover.run_problem import columns_at
 from calib.effects import effect_named
+from calib.identify.signatures import columns_at
+from calib.identify.staged import fit_effects
 from calib.runs import parse_run
 from calib.runs.stack import stack
 from mocks.physics.hidden import Hidden

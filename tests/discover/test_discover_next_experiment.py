@@ -11,11 +11,11 @@ from app.analysis import load_refitter
 from app.files.machines import load_machine
 from app.files.poses import read_pose_file
 from app.verbs.design import command
+from calib.discover.design import design_follow_up
 from calib.discover.follow_up import FollowUp, own_to_each_run
-from calib.discover.next_experiment import Blocks, Separation, choose_sequence
-from calib.discover.run_design import design_follow_up
 from calib.effects import effect_named
 from calib.errors import BadInput
+from calib.evidence.next_experiment import Blocks, Separation, choose_sequence
 from calib.mechanism.solve import forward
 from calib.model.columns import whitened_columns
 from calib.poses.reach import sample_poses, solve_poses

@@ -7,9 +7,9 @@ import pytest
 
 from app.files.runs import read_runs
 from calib.effects import effect_named
-from calib.effects.expression import linear_unknowns, parse_expression
-from calib.effects.operator import effect_from_text
 from calib.errors import BadInput
+from calib.formulas.effect_file import effect_from_text
+from calib.formulas.expression import linear_unknowns, parse_expression
 from calib.identify import fit
 from calib.model import Model
 from calib.runs.stack import stack

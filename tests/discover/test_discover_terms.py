@@ -8,10 +8,10 @@ import pytest
 from discover_synthetic import POSES, Lab
 
 from app.files.runs import read_runs
-from calib.discover import Candidate, Term
-from calib.discover.run_terms import library, propose
-from calib.discover.terms import select_terms
-from calib.effects.operator import effect_from_text
+from calib.discover.terms import library, propose
+from calib.evidence import Candidate, Term
+from calib.evidence.terms import select_terms
+from calib.formulas.effect_file import effect_from_text
 from calib.identify import fit
 from calib.model import Model
 from calib.runs.stack import stack

@@ -10,7 +10,7 @@ import pytest
 
 from app.cli import run
 from app.files.machines import load_machine
-from calib.discover.run_diagnosis import fit_effects
+from calib.identify.staged import fit_effects
 from calib.runs import parse_run
 from calib.runs.stack import stack
 from mocks.clock import ManualClock

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from app.files.pose_table import Pose
 from app.files.site import Site, site_of_mock
 from app.session import events as ev
-from app.session.plan import Pose
 from mocks.control import ControlClient
 
 SCALE = 400

@@ -9,12 +9,12 @@ import pytest
 from session_mock import POSES, Heard, Mock
 
 from app.errors import GateRefused, StoppedByOperator
+from app.files.pose_table import Pose
 from app.files.site import parse_site
 from app.session import PlanOptions, Session, measure_plan
 from app.session import events as ev
 from app.session.journal import Journal
 from app.session.ownership import Ownership
-from app.session.plan import Pose
 from drivers.errors import (
     DeviceError,
     DriveFault,

@@ -4,9 +4,10 @@ import asyncio
 
 import numpy as np
 
+from app.files.pose_table import Pose
 from app.session.events import LivePose, PoseCommanded
 from app.session.journal import NewRow
-from app.session.plan import Pose, Step
+from app.session.plan import Step
 from app.session.work import HOME, Done, Work
 from calib.mechanism.rigid import Poses
 from calib.mechanism.task import FULL, task_values

@@ -11,12 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.arrays import Array
-from calib.discover.candidate import Candidate
-from calib.discover.diagnosis import diagnose
-from calib.discover.family import family
-from calib.discover.findings import Finding
 from calib.discover.follow_up import FollowUp, own_to_each_run
-from calib.discover.next_experiment import Blocks, choose_sequence
 from calib.discover.old_and_new import (
     Side,
     Together,
@@ -26,13 +21,19 @@ from calib.discover.old_and_new import (
     rival_of,
     separation,
 )
-from calib.discover.pairs import power, prefers
-from calib.discover.problem import LinearProblem
-from calib.discover.run_problem import EffectColumns, effect_candidates, effect_columns, problem_of
-from calib.discover.scores import score
+from calib.discover.problem import effect_candidates
 from calib.effects.component import Effect
 from calib.errors import BadInput
+from calib.evidence.candidate import Candidate
+from calib.evidence.diagnosis import diagnose
+from calib.evidence.family import family
+from calib.evidence.findings import Finding
+from calib.evidence.next_experiment import Blocks, choose_sequence
+from calib.evidence.pairs import power, prefers
+from calib.evidence.problem import LinearProblem
+from calib.evidence.scores import score
 from calib.identify.fitting import Fit
+from calib.identify.signatures import EffectColumns, effect_columns
 from calib.poses.reach import PoseSet, sample_poses
 
 CANDIDATES = 250
@@ -106,7 +107,7 @@ def design_follow_up(
     poses = sample_poses(fit.model.machine, candidates, rng)
     offered = [_candidate(side, side.now) for side in sides]
     hidden = [side.signature for side in sides]
-    before = _chances(problem_of(fit), offered, hidden, rng)
+    before = _chances(fit.problem, offered, hidden, rng)
     best: Plan | None = None
     for condition in conditions or default_conditions(fit, effects):
         if watch is not None:
@@ -143,7 +144,7 @@ def _sides(fit: Fit, effects: Sequence[Effect], rng: np.random.Generator) -> lis
         if reason := effect.unavailable(rows):
             raise BadInput(f"{effect.id} cannot be told from anything here: {reason}")
     columns = effect_columns(fit, effects)
-    problem = problem_of(fit)
+    problem = fit.problem
     offered = effect_candidates(fit, problem, columns)
     found = diagnose(problem, offered, rng=rng, draws=99)
     findings = {finding.name: finding for finding in found.findings}

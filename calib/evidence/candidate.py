@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from calib.arrays import Array, BoolArray, IntArray
-from calib.discover.problem import LinearProblem
+from calib.evidence.problem import LinearProblem
 
 
 @dataclass(frozen=True)

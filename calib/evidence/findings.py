@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from calib.arrays import Array
-from calib.discover.family import Family
-from calib.discover.scores import Scores
+from calib.evidence.family import Family
+from calib.evidence.scores import Scores
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,12 @@ import numpy as np
 from scipy import stats
 
 from calib.arrays import Array
-from calib.discover.findings import Diagnosis, Finding
-from calib.discover.forward import Discovery
-from calib.discover.run_agreement import TOGETHER_WORSE, runs_at_odds, untrue_uncertainties
-from calib.discover.run_diagnosis import RunDiagnosis
-from calib.discover.run_discovery import RunStage, stage_of
+from calib.discover.agreement import TOGETHER_WORSE, runs_at_odds, untrue_uncertainties
+from calib.discover.diagnosis import RunDiagnosis
+from calib.discover.discovery import RunStage, stage_of
 from calib.effects.component import Unknown
+from calib.evidence.findings import Diagnosis, Finding
+from calib.evidence.forward import Discovery
 from calib.identify.fitting import Fit
 from calib.identify.report import bad_readings, quality
 from calib.identify.starting import MOVED

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.arrays import Array
-from calib.discover.tails import log_any, looks
+from calib.evidence.tails import log_any, looks
 
 ENOUGH = 10
 """Draws that must exceed the observation for their count to be used instead of the tail."""

@@ -17,7 +17,7 @@ import numpy as np
 from scipy import special
 
 from calib.arrays import Array
-from calib.discover.scores import Scores
+from calib.evidence.scores import Scores
 
 TAUS = np.geomspace(1.0 / 30.0, 3.0, 7)
 """Multiples of the stated size over which the prior of an effect is averaged."""

@@ -9,7 +9,7 @@ import numpy as np
 from calib.arrays import Array
 from calib.effects.component import Effect, Kind, Signature, Situation, Unknown, limb_names
 from calib.effects.component import alone as alone_parts
-from calib.effects.expression import (
+from calib.formulas.expression import (
     Expression,
     linear_unknowns,
 )

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 from scipy import stats
 
-from calib.discover.run_diagnosis import fit_effects
 from calib.errors import BadInput
 from calib.identify.fitting import Fit
+from calib.identify.staged import fit_effects
 from calib.runs.stack import stack
 
 BY_CHANCE = 1e-6

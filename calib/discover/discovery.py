@@ -6,14 +6,15 @@ from functools import cached_property
 
 import numpy as np
 
-from calib.discover.findings import Diagnosis
-from calib.discover.forward import Discovery, discover
-from calib.discover.run_diagnosis import RunDiagnosis, diagnose_fit, fit_effects
-from calib.discover.tails import log_tail
+from calib.discover.diagnosis import RunDiagnosis, diagnose_fit
 from calib.effects.component import Effect
 from calib.errors import BadInput
+from calib.evidence.findings import Diagnosis
+from calib.evidence.forward import Discovery, discover
+from calib.evidence.tails import log_tail
 from calib.identify.fitting import Fit
 from calib.identify.holdout import hold_out
+from calib.identify.staged import fit_effects
 from calib.runs.stack import Rows
 
 SEED = 20_260_801

@@ -19,10 +19,10 @@ import numpy as np
 from scipy import linalg
 
 from calib.arrays import Array
-from calib.discover.candidate import Candidate
-from calib.discover.problem import LinearProblem
-from calib.discover.tails import log_any, log_tail, looks
-from calib.discover.weighing import Stack, Weighing, soft_test, stacked
+from calib.evidence.candidate import Candidate
+from calib.evidence.problem import LinearProblem
+from calib.evidence.tails import log_any, log_tail, looks
+from calib.evidence.weighing import Stack, Weighing, soft_test, stacked
 
 EVEN = 0.9
 """A group that is seen so evenly needs no test in which its directions weigh differently."""
@@ -53,7 +53,7 @@ class Scores:
     scores: list[Array]
     weights: list[Array]
     remembered: dict[int, tuple[float, list[Array]]] = field(default_factory=dict, repr=False)
-    """Evidence of the observation by candidate, kept by :mod:`calib.discover.evidence`."""
+    """Evidence of the observation by candidate, kept by :mod:`calib.evidence.bayes`."""
 
     @cached_property
     def squares(self) -> Array:

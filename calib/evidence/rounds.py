@@ -7,11 +7,11 @@ from functools import cached_property
 import numpy as np
 
 from calib.arrays import Array
-from calib.discover.evidence import observed
-from calib.discover.family import Family, family
-from calib.discover.quadratic import Quadratic
-from calib.discover.scores import Scores
-from calib.discover.weighing import chi_squares
+from calib.evidence.bayes import observed
+from calib.evidence.family import Family, family
+from calib.evidence.quadratic import Quadratic
+from calib.evidence.scores import Scores
+from calib.evidence.weighing import chi_squares
 
 STRUCTURE_SHARE = 0.05
 """Part of the false alarms that structure of unknown origin may cause; effects have the rest."""

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from calib.arrays import Array
-from calib.discover.evidence import log_evidence, observed
-from calib.discover.family import Family
-from calib.discover.scores import Scores
-from calib.discover.tails import log_any, looks
+from calib.evidence.bayes import log_evidence, observed
+from calib.evidence.family import Family
+from calib.evidence.scores import Scores
+from calib.evidence.tails import log_any, looks
 
 TOLD_APART = 0.8
 """Pairs that the run would tell apart with a lower probability are reported."""

@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from calib.discover.diagnosis import ALPHA
-from calib.discover.findings import Diagnosis
+from calib.evidence.diagnosis import ALPHA
+from calib.evidence.findings import Diagnosis
 
 MOST_STEPS = 8
 SLACK = 1e-6

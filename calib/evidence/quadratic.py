@@ -10,7 +10,7 @@ import numpy as np
 from scipy import stats
 
 from calib.arrays import Array, IntArray
-from calib.discover.tails import log_tail
+from calib.evidence.tails import log_tail
 
 
 @dataclass(frozen=True, eq=False)

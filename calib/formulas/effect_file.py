@@ -22,19 +22,18 @@ import math
 import re
 from typing import Any
 
-from calib.effects.component import Effect, Kind
-from calib.effects.expression import (
+from calib.effects.component import Kind
+from calib.errors import BadInput
+from calib.formulas.expression import (
     CONSTANTS,
     FUNCTIONS,
     Expression,
     parse_expression,
     vanishes_without,
 )
-from calib.effects.formula_effect import NUMBERED, OWN, POINT, TRIALS, Declared, OperatorEffect
-from calib.errors import BadInput
+from calib.formulas.formula_effect import NUMBERED, OWN, POINT, TRIALS, Declared, OperatorEffect
 from calib.toml_place import line_of, load_toml
 
-EFFECTS: tuple[Effect, ...] = ()
 KINDS = ("machine", "measurement")
 _RANGE = ("from", "to")
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from calib.arrays import Array
-from calib.discover.candidate import Candidate, Term
+from calib.evidence.candidate import Candidate, Term
 
 ORDER = 4
 """Highest order of the smooth functions (Legendre polynomials over the variable's range)."""

@@ -1,0 +1,39 @@
+"""Statistics of discovery: which effect is missing, how sure, and what it cannot be told from.
+
+It knows no machine. It takes a :class:`LinearProblem` (whitened residual of a fit and the
+whitened derivatives of everything fitted, with priors) and :class:`Candidate` s (named groups of
+whitened columns, one block for each trial of a nonlinear unknown), and answers a
+:class:`Diagnosis`.
+"""
+
+from calib.evidence.candidate import Candidate, Term, fill_missing
+from calib.evidence.diagnosis import diagnose
+from calib.evidence.findings import Diagnosis, Finding, Unexplained
+from calib.evidence.forward import Discovery, Stage, Step, discover
+from calib.evidence.problem import LinearProblem
+from calib.evidence.quadratic import Blocks, Neighbours, blocks_of
+from calib.evidence.repeats import PureError, pure_error
+from calib.evidence.structure import Carrier, Variable, structure_candidates
+
+__all__ = [
+    "Blocks",
+    "Candidate",
+    "Carrier",
+    "Diagnosis",
+    "Discovery",
+    "Finding",
+    "LinearProblem",
+    "Neighbours",
+    "PureError",
+    "Stage",
+    "Step",
+    "Term",
+    "Unexplained",
+    "Variable",
+    "blocks_of",
+    "diagnose",
+    "discover",
+    "fill_missing",
+    "pure_error",
+    "structure_candidates",
+]

@@ -1,0 +1,191 @@
+"""Which effect is missing? All candidates and all structure judged in one family.
+
+The candidates are scored against the residual of the current fit. Those that are significant are
+added to the linearised fit one by one, the one with the most evidence first, until none is left;
+what is significant then, and belongs to no candidate, is unexplained.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calib.arrays import Array
+from calib.evidence.bayes import observed
+from calib.evidence.candidate import Candidate
+from calib.evidence.findings import Dependence, Diagnosis, Estimate, Finding, Unexplained
+from calib.evidence.pairs import rivals
+from calib.evidence.problem import LinearProblem
+from calib.evidence.quadratic import Quadratic
+from calib.evidence.rounds import (
+    Exploration,
+    Round,
+    at_least,
+    best_hypothesis,
+    explore,
+    signature_of,
+)
+from calib.evidence.scores import Scores, score
+from calib.evidence.weighing import chi_squares
+
+ALPHA = 0.05
+DRAWS = 399
+FIRST_DRAWS = 99
+IN_QUESTION = 7.0
+"""Candidates whose evidence is less than e^7 below the best are still in question."""
+UNKNOWN_MARGIN = 10.0
+"""Structure of unknown origin must beat the effects' evidence by e^10 to be preferred,"""
+UNKNOWN_SHARE = 0.1
+"""and by this part of it: a scan meets no period exactly, at a cost that grows with the effect."""
+
+
+def diagnose(
+    problem: LinearProblem,
+    effects: Sequence[Candidate],
+    structure: Sequence[Candidate] = (),
+    quadratic: Sequence[Quadratic] = (),
+    *,
+    rng: np.random.Generator,
+    draws: int = DRAWS,
+    alpha: float = ALPHA,
+) -> Diagnosis:
+    """Judge all candidates and all structure as one family.
+
+    Parameters
+    ----------
+    problem : LinearProblem
+        The fit as it is.
+    effects : sequence of Candidate
+        Known effects that are not in the fit.
+    structure : sequence of Candidate
+        See :func:`calib.evidence.structure.structure_candidates`.
+    quadratic : sequence of Neighbours or Blocks
+    rng : numpy Generator
+        Draws the null distribution; the same seed gives the same answer.
+    draws : int
+        Null draws where a decision is close; the first 99 decide what is clear. With 399 ranked
+        among them, P(p <= 0.05) is 0.05.
+    alpha : float
+        Family-wise false alarm.
+    """
+    first_draws = min(FIRST_DRAWS, draws)
+    scores = score(problem, [*effects, *structure], rng, first_draws)
+    found = explore(scores, len(effects), quadratic, alpha, rng)
+    if draws > first_draws and found.close(alpha):
+        scores = scores.with_more(draws - first_draws, rng)
+        found = explore(scores, len(effects), quadratic, alpha, rng)
+    first, last, chosen = found.rounds[0], found.rounds[-1], found.chosen
+    left = _unexplained(last, quadratic, alpha)
+    before = _unexplained(first, quadratic, alpha)
+    unknown = max((d.log_evidence for d in before.dependences), default=0.0)
+    explained = sum(value for _, value in chosen)
+    preferred = unknown > (1.0 + UNKNOWN_SHARE) * max(explained, 0.0) + UNKNOWN_MARGIN
+    if preferred and not left.significant:
+        left = before
+    return Diagnosis(
+        findings=tuple(_finding(first, index, value) for index, value in first.evidences.items()),
+        explained_by=tuple(scores.candidates[index].name for index, _ in chosen),
+        indistinguishable=tuple(
+            tuple(scores.candidates[index].name for index in group)
+            for group in _groups(found, alpha)
+        ),
+        unexplained=left,
+        unknown_preferred=preferred,
+        adequate=not chosen and not left.significant,
+        scatter=float(last.scores.squares[0]) / max(last.scores.problem.trace, 1.0),
+        scores=scores,
+        family=first.family,
+    )
+
+
+def _groups(found: Exploration, alpha: float) -> list[tuple[int, ...]]:
+    """For each chosen effect, itself first, those from which it cannot be told; none if alone."""
+    groups: list[tuple[int, ...]] = []
+    for judged, best in found.decided():
+        questioned = _in_question(judged, best, alpha)
+        signatures = {index: at_least(judged.scores, index) for index in questioned}
+        if others := rivals(judged.scores, best, questioned, signatures):
+            groups.append((best, *others))
+    return groups
+
+
+def _in_question(judged: Round, best: int, alpha: float) -> list[int]:
+    """The best, and those that are significant on their own and not yet refuted by the data."""
+    own, evidences = judged.family.own_log_p, judged.evidences
+    return [
+        index
+        for index in evidences
+        if index == best
+        or (own[index] <= np.log(alpha) and evidences[index] > evidences[best] - IN_QUESTION)
+    ]
+
+
+def _finding(judged: Round, index: int, evidence: float) -> Finding:
+    scores, candidate = judged.scores, judged.scores.candidates[index]
+    signature, number, trial = signature_of(scores, index)
+    subset = candidate.hypotheses[number]
+    weighing = scores.weighings[index][number]
+    beta, covariance = scores.estimate(index, trial, candidate.hypotheses[0])
+    sigmas = np.sqrt(np.diag(covariance))
+    return Finding(
+        index=index,
+        name=candidate.name,
+        log_p=judged.log_p(index),
+        log_evidence=evidence,
+        chi2_fall=float(chi_squares(weighing, scores.scores[index][:, :, :1])[trial, 0]),
+        dof=int(weighing.dof[trial]),
+        trial=candidate.trials[trial],
+        acting=tuple(candidate.terms[term].name for term in subset),
+        estimates=tuple(
+            Estimate(term.name, float(value), float(sigma), term.unit)
+            for term, value, sigma in zip(candidate.terms, beta, sigmas, strict=True)
+        ),
+        visible=scores.problem.visible(candidate.sizes[:, None] * candidate.columns[trial]),
+        signature=signature,
+    )
+
+
+def _unexplained(judged: Round, quadratic: Sequence[Quadratic], alpha: float) -> Unexplained:
+    """Structure that is significant in a round, the channels with the most evidence first."""
+    scores = judged.scores
+    count = len(scores.candidates)
+    found: dict[str, Dependence] = {}
+    smallest = 0.0
+    for index in range(len(judged.effects), count + len(quadratic)):
+        log_p = judged.log_p(index)
+        smallest = min(smallest, log_p)
+        if log_p > np.log(alpha) + 1e-9:
+            continue
+        if index < count:
+            here = _dependence(scores, index, log_p)
+        else:
+            here = Dependence(quadratic[index - count].channel, log_p, -log_p)
+        known = found.get(here.channel)
+        if known is None or here.log_evidence > known.log_evidence:
+            found[here.channel] = here
+    ordered = sorted(found.values(), key=lambda each: -each.log_evidence)
+    return Unexplained(bool(ordered), smallest, tuple(ordered))
+
+
+def _dependence(scores: Scores, index: int, log_p: float) -> Dependence:
+    candidate = scores.candidates[index]
+    evidence, parts = observed(scores, index)
+    number, trial = best_hypothesis(scores, index)
+    period = None
+    if candidate.trials[trial]:
+        period = _peak([one[0] for one in candidate.trials], parts[number][:, 0], trial)
+    return Dependence(candidate.channel, log_p, evidence, period)
+
+
+def _peak(periods: list[float], evidence: Array, best: int) -> float:
+    """Period at the top of a parabola through the best frequency tried and its neighbours."""
+    if not 0 < best < len(periods) - 1:
+        return periods[best]
+    near = slice(best - 1, best + 2)
+    frequency = 1.0 / np.array(periods[near])
+    shift, height = frequency - frequency[1], evidence[near] - evidence[best]
+    (left, right), (low, high) = shift[[0, 2]], height[[0, 2]]
+    curvature = (high / right - low / left) / (right - left)
+    if not curvature < 0.0:
+        return periods[best]
+    top = -0.5 * (high / right - curvature * right) / curvature
+    return float(1.0 / (frequency[1] + np.clip(top, min(shift), max(shift))))

@@ -1,0 +1,145 @@
+"""A fit as the discovery core sees it: residual, derivatives and priors, all in sigmas.
+
+Near its optimum the model reads y = J^T theta + A^T beta + eps with eps ~ N(0, I), the fitted
+unknowns theta with prior precision Lambda (zero where there is no prior) and the candidate's
+unknowns beta. With N = J J^T + Lambda = L L^T and G = L^-1 J the residual of the fit is
+
+    e = M (y - f(prior mean)),      M = I - J^T N^-1 J = I - G^T G.
+
+Under "nothing is missing" the truth is drawn from its prior and y - f has covariance
+I + J^T Lambda^-1 J = M^-1 (Woodbury), so that
+
+    e ~ N(0, M)    and    A e ~ N(A M A^T beta, A M A^T)
+
+exactly: M is the marginal weight of the readings after geometry, frames and effects already in
+have taken what they can. It is never formed; G, of p rows, stands for it.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import linalg
+
+from calib.arrays import Array
+
+VANISHING = 1e-10
+"""Eigenvalues of the scaled J J^T below this times the largest are directions not seen at all."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearProblem:
+    """A linearised fit of R whitened readings' components with p fitted unknowns.
+
+    Attributes
+    ----------
+    residual : (R,)
+        Measured minus predicted at the optimum, in sigmas.
+    jacobian : (p, R)
+        Derivatives of the prediction by the fitted unknowns, in sigmas per unit.
+    prior_precision : (p,)
+        1 / sigma^2 of the priors; zero for unknowns without one (frames).
+    """
+
+    residual: Array
+    jacobian: Array
+    prior_precision: Array
+
+    def __post_init__(self) -> None:
+        p, rows = self.jacobian.shape
+        if self.residual.shape != (rows,) or self.prior_precision.shape != (p,):
+            raise ValueError(
+                f"shapes do not fit: residual {self.residual.shape}, jacobian"
+                f" {self.jacobian.shape}, prior_precision {self.prior_precision.shape}"
+            )
+
+    @property
+    def rows(self) -> int:
+        """Number R of whitened components."""
+        return self.residual.size
+
+    @cached_property
+    def _factor(self) -> tuple[Array, Array]:
+        """Lower Cholesky factor of N scaled to a unit diagonal, and the scale (p,)."""
+        normal = self.jacobian @ self.jacobian.T
+        normal[np.diag_indices_from(normal)] += self.prior_precision
+        diagonal = np.diag(normal)
+        scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+        scaled = normal * scale[:, None] * scale
+        # 1e-12 keeps unknowns that neither data nor prior determine from stopping the diagnosis
+        scaled[np.diag_indices_from(scaled)] += 1e-12
+        return linalg.cholesky(scaled, lower=True), scale
+
+    @cached_property
+    def absorbed(self) -> Array:
+        """G (p, R): M = I - G^T G."""
+        factor, scale = self._factor
+        return np.asarray(
+            linalg.solve_triangular(factor, scale[:, None] * self.jacobian, lower=True)
+        )
+
+    def whitened_step(self, slope: Array) -> Array:
+        """L^-1 slope (p,): a step of the fitted unknowns moves the prediction by G^T times it."""
+        factor, scale = self._factor
+        return np.asarray(linalg.solve_triangular(factor, scale * slope, lower=True))
+
+    @cached_property
+    def trace(self) -> float:
+        """tr M = R - tr H, the degrees of freedom left."""
+        return float(self.rows - np.sum(self.absorbed**2))
+
+    @cached_property
+    def _column_space(self) -> Array:
+        """Orthonormal rows (rank, R) that span the rows of J, priors left aside."""
+        size = np.sqrt(np.sum(self.jacobian**2, axis=1))
+        unit = self.jacobian / np.where(size > 0.0, size, 1.0)[:, None]
+        values, vectors = linalg.eigh(unit @ unit.T)
+        seen = values > VANISHING * max(float(values[-1]), VANISHING) if values.size else values > 0
+        return np.asarray((vectors[:, seen] / np.sqrt(values[seen])).T @ unit)
+
+    def project(self, columns: Array) -> Array:
+        """What of ``columns`` (..., R) is left for a candidate: columns @ M."""
+        return np.asarray(columns - (columns @ self.absorbed.T) @ self.absorbed)
+
+    def visible(self, columns: Array) -> float:
+        """Norm of ``columns`` (k, R) after projecting out everything fitted, over its norm before.
+
+        A ratio of norms, without priors: what a fit with free geometry could have absorbed is
+        gone. For several columns, in units of their sizes, Frobenius norms are compared; so it is
+        a property of the run, not of the noise. Answers 0 for columns that are zero.
+        """
+        before = float(np.sum(columns**2))
+        if before == 0.0:
+            return 0.0
+        within = columns @ self._column_space.T
+        return float(np.sqrt(max(before - float(np.sum(within**2)), 0.0) / before))
+
+    def null_residuals(self, draws: int, rng: np.random.Generator) -> Array:
+        """Residuals (R, draws) of fits in which nothing is missing, e ~ N(0, M).
+
+        By perturbation: e = eps - J^T N^-1 (J eps + Lambda^1/2 xi), whose covariance is
+        I - 2 J^T N^-1 J + J^T N^-1 N N^-1 J = M.
+        """
+        factor, scale = self._factor
+        noise = rng.standard_normal((self.rows, draws))
+        prior = np.sqrt(self.prior_precision)[:, None] * rng.standard_normal(
+            (self.prior_precision.size, draws)
+        )
+        pulled = self.absorbed @ noise + linalg.solve_triangular(
+            factor, scale[:, None] * prior, lower=True
+        )
+        return np.asarray(noise - self.absorbed.T @ pulled)
+
+    def with_columns(self, columns: Array, precision: Array) -> "LinearProblem":
+        """Let the fit take ``columns`` (k, R) too, with prior ``precision`` (k,); relinearised.
+
+        The residual becomes that of the larger fit to first order.
+        """
+        projected = self.project(columns)
+        weight = columns @ projected.T + np.diag(precision)
+        beta = np.linalg.lstsq(weight, columns @ self.residual, rcond=1e-12)[0]
+        return LinearProblem(
+            residual=self.residual - projected.T @ beta,
+            jacobian=np.concatenate([self.jacobian, columns]),
+            prior_precision=np.concatenate([self.prior_precision, precision]),
+        )
