@@ -7,7 +7,6 @@ from calib.effects.component import (
     Situation,
     Unknown,
     alone,
-    limb_names,
     per_actuator,
 )
 from calib.runs.stack import Rows
@@ -24,8 +23,8 @@ class Backlash(Effect):
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``backlash.leg1`` ..., mm or rad."""
         return tuple(
-            Unknown(f"backlash.{name}", a.unit, 0.02 if a.unit == "mm" else 1e-4)
-            for name, a in zip(limb_names(rows.machine), rows.machine.actuators, strict=True)
+            Unknown(f"backlash.{axis.name}", axis.unit, axis.lost_motion)
+            for axis in rows.machine.axes
         )
 
     def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:

@@ -214,20 +214,6 @@ class Effect(ABC):
         """Derivatives at ``values`` (U,)."""
 
 
-def limb_names(machine: Machine) -> list[str]:
-    """Name of the limb that each actuator drives, or of the actuator where several share it."""
-    names = []
-    for index, actuator in enumerate(machine.actuators):
-        driven = [
-            limb.name
-            for limb in machine.limbs
-            for element in limb.elements
-            if any(term.kind == "actuator" and term.index == index for term in element.terms)
-        ]
-        names.append(driven[0] if len(set(driven)) == 1 else actuator.name)
-    return names
-
-
 def alone(count: int, each: int = 1) -> tuple[tuple[int, ...], ...]:
     """Parts of ``each`` successive unknowns: one leg, one nest or one axis alone."""
     return tuple(tuple(range(each * k, each * k + each)) for k in range(count))

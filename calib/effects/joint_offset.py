@@ -10,7 +10,7 @@ across the joint's first axis, n_P that of C - P.
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown, alone, limb_names
+from calib.effects.component import Effect, Signature, Situation, Unknown, alone
 from calib.effects.limb_frames import frames_along, joint_index
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import rotate
@@ -39,8 +39,8 @@ class JointOffset(Effect):
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``joint-offset.leg1.L_B``, ``.L_P`` ..., mm."""
         return tuple(
-            Unknown(f"joint-offset.{name}.{arm}", "mm", 5.0)
-            for name in limb_names(rows.machine)
+            Unknown(f"joint-offset.{limb.name}.{arm}", "mm", 5.0)
+            for limb in rows.machine.limbs
             for arm in ("L_B", "L_P")
         )
 

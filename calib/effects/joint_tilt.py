@@ -9,7 +9,7 @@ like an extension +u . (e x (C - B)); on the platform it moves D and acts like -
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown, alone, limb_names
+from calib.effects.component import Effect, Signature, Situation, Unknown, alone
 from calib.effects.limb_frames import frames_along, joint_index
 from calib.mechanism.description import Limb, Machine
 from calib.mechanism.rigid import cross
@@ -37,8 +37,8 @@ class JointTilt(Effect):
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``joint-tilt.leg1.base.y`` ..., rad."""
         return tuple(
-            Unknown(f"joint-tilt.{name}.{body}.{axis}", "rad", SIGMA_RAD, sigma=SIGMA_RAD)
-            for name in limb_names(rows.machine)
+            Unknown(f"joint-tilt.{limb.name}.{body}.{axis}", "rad", SIGMA_RAD, sigma=SIGMA_RAD)
+            for limb in rows.machine.limbs
             for body in ("base", "platform")
             for axis in "yz"
         )

@@ -7,7 +7,6 @@ from calib.effects.component import (
     Situation,
     Unknown,
     alone,
-    limb_names,
     per_actuator,
 )
 from calib.runs.stack import Rows
@@ -22,7 +21,7 @@ class ScrewPitch(Effect):
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``screw-pitch.leg1`` ..., a ratio."""
-        return tuple(Unknown(f"screw-pitch.{name}", "1", 1e-3) for name in limb_names(rows.machine))
+        return tuple(Unknown(f"screw-pitch.{axis.name}", "1", 1e-3) for axis in rows.machine.axes)
 
     def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
         """Each actuator alone."""

@@ -8,7 +8,7 @@ sides are equal springs, their hinges in the file's proportion to them.
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown, alone, limb_names
+from calib.effects.component import Effect, Signature, Situation, Unknown, alone
 from calib.effects.gravity_sag import GravitySag, weight_wrench
 from calib.effects.thermal_growth import REFERENCE_C, ThermalGrowth
 from calib.mechanism.closure import Closure, State
@@ -23,7 +23,7 @@ def has_parallelograms(machine: Machine) -> bool:
     detailed = machine.detailed or machine
     names = {parameter.name for parameter in detailed.parameters}
     wanted = (*SIDES, "dtheta_Bz", "h")
-    return all(f"{limb}.{part}" in names for limb in limb_names(machine) for part in wanted)
+    return all(f"{axis.name}.{part}" in names for axis in machine.axes for part in wanted)
 
 
 class TripodGravity(GravitySag):
@@ -83,9 +83,9 @@ class TripodThermal(ThermalGrowth):
         machine = situation.machine
         warming = situation.rows.channels["structure_temp_C"] - REFERENCE_C
         total = np.zeros((6, situation.rows.count))
-        for limb in limb_names(machine):
-            length = machine.nominal[machine.index(f"{limb}.h")]
-            total += length * warming * situation.error_twists(f"{limb}.h")
+        for axis in machine.axes:
+            length = machine.nominal[machine.index(f"{axis.name}.h")]
+            total += length * warming * situation.error_twists(f"{axis.name}.h")
         return Signature(twist=total[None])
 
 
@@ -103,7 +103,7 @@ class ParallelogramSides(Effect):
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``parallelogram-sides.limb1`` ..., mm: side 1 less side 2."""
         return tuple(
-            Unknown(f"parallelogram-sides.{name}", "mm", 0.05) for name in limb_names(rows.machine)
+            Unknown(f"parallelogram-sides.{axis.name}", "mm", 0.05) for axis in rows.machine.axes
         )
 
     def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
@@ -115,9 +115,9 @@ class ParallelogramSides(Effect):
         return Signature(
             twist=np.array(
                 [
-                    0.5 * situation.error_twists(f"{limb}.dh1")
-                    - 0.5 * situation.error_twists(f"{limb}.dh2")
-                    for limb in limb_names(situation.machine)
+                    0.5 * situation.error_twists(f"{axis.name}.dh1")
+                    - 0.5 * situation.error_twists(f"{axis.name}.dh2")
+                    for axis in situation.machine.axes
                 ]
             )
         )
@@ -137,7 +137,7 @@ class JointAzimuth(Effect):
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``joint-azimuth.limb1`` ..., rad."""
         return tuple(
-            Unknown(f"joint-azimuth.{name}", "rad", 1e-3) for name in limb_names(rows.machine)
+            Unknown(f"joint-azimuth.{axis.name}", "rad", 1e-3) for axis in rows.machine.axes
         )
 
     def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
@@ -149,8 +149,8 @@ class JointAzimuth(Effect):
         return Signature(
             twist=np.array(
                 [
-                    situation.error_twists(f"{limb}.dtheta_Bz")
-                    for limb in limb_names(situation.machine)
+                    situation.error_twists(f"{axis.name}.dtheta_Bz")
+                    for axis in situation.machine.axes
                 ]
             )
         )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Kind, Signature, Situation, Unknown, limb_names
+from calib.effects.component import Effect, Kind, Signature, Situation, Unknown
 from calib.effects.component import alone as alone_parts
 from calib.formulas.expression import (
     Expression,
@@ -95,7 +95,7 @@ class OperatorEffect(Effect):
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``id.limb.k`` for each actuator, or ``id.k``; then the searched ones, ``id.tau``."""
-        limbs = [""] if self._common else [f"{name}." for name in limb_names(rows.machine)]
+        limbs = [""] if self._common else [f"{axis.name}." for axis in rows.machine.axes]
         sizes = self._sizes(rows)
         found = [
             Unknown(f"{self.id}.{limb}{one.name}", one.unit, one.size or sizes[one.name], one.sigma)
@@ -115,8 +115,8 @@ class OperatorEffect(Effect):
     def _sizes(self, rows: Rows) -> dict[str, float]:
         """Sizes that move the readings by ``USUAL_MM`` (actuators in rad: a hundredth of it)."""
         usual = USUAL_MM
-        if self.acts_on == "actuator" and rows.machine.actuators[0].unit == "rad":
-            usual = 0.01 * USUAL_MM
+        if self.acts_on == "actuator":
+            usual = rows.machine.axes[0].usual_error
         shapes = self._shapes(self._columns(rows, rows.position), next(self.trials(rows)))
         sizes = {}
         for one, shape in zip(self.linear, shapes, strict=True):

@@ -15,6 +15,7 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray
 from calib.errors import BadInput
+from calib.mechanism.axes import Axis, axes_of
 
 Kind = Literal["parameter", "actuator", "passive"]
 
@@ -185,6 +186,11 @@ class Machine:
     def joints(self) -> tuple[PassiveJoint, ...]:
         """All passive coordinates, limb after limb."""
         return tuple(joint for limb in self.limbs for joint in limb.joints)
+
+    @cached_property
+    def axes(self) -> tuple[Axis, ...]:
+        """The actuators as errors along them are spoken of: unique name, unit, what is usual."""
+        return axes_of(self.actuators, self.limbs)
 
     @cached_property
     def home_q(self) -> Array:
