@@ -17,19 +17,9 @@ from numpy.typing import NDArray
 from app.files.machines import read_text
 from calib.errors import BadInput
 from calib.toml_place import load_toml
+from calib.unknown import Estimate, Unknown
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """One parameter as a fit found it."""
-
-    name: str
-    value: float
-    sigma: float
-    unit: str
-    identified: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,10 +107,9 @@ def _json(text: str, source: str) -> dict[str, Any]:
 def _estimate(entry: Mapping[str, Any]) -> Estimate:
     value, sigma = entry["value"], entry["sigma"]
     return Estimate(
-        str(entry["name"]),
+        Unknown(str(entry["name"]), str(entry.get("unit", ""))),
         math.nan if value is None else float(value),
         math.nan if sigma is None else float(sigma),
-        str(entry.get("unit", "")),
         bool(entry.get("identified", True)),
     )
 

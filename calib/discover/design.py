@@ -242,15 +242,15 @@ def _candidate(side: Side, now: Array, then: Array | None = None) -> Candidate:
     """One effect at its trial over old readings, and new ones; a drift has its own in each."""
     whole = side.candidate
     if then is None:
-        return Candidate(whole.name, whole.terms, now[None], subsets=whole.subsets)
+        return Candidate(whole.name, whole.unknowns, now[None], subsets=whole.subsets)
     if not side.own:
         columns = np.concatenate([now, then], axis=1)
-        return Candidate(whole.name, whole.terms, columns[None], subsets=whole.subsets)
+        return Candidate(whole.name, whole.unknowns, columns[None], subsets=whole.subsets)
     columns = np.block([[now, np.zeros((now.shape[0], then.shape[1]))], [np.zeros_like(now), then]])
-    return Candidate(whole.name, whole.terms * 2, columns[None])
+    return Candidate(whole.name, whole.unknowns * 2, columns[None])
 
 
 def _hidden(side: Side, candidate: Candidate) -> Array:
     """Displacement (R,) of all readings if this effect is the truth."""
-    amplitudes = np.resize(side.amplitudes, len(candidate.terms))
+    amplitudes = np.resize(side.amplitudes, len(candidate.unknowns))
     return np.asarray(amplitudes @ candidate.columns[0])

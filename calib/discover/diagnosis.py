@@ -8,7 +8,7 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray
 from calib.discover.problem import effect_candidates, quadratics_of, variables_of
-from calib.effects.component import Effect, Unknown
+from calib.effects.component import Effect
 from calib.evidence.diagnosis import diagnose
 from calib.evidence.findings import Diagnosis, Finding
 from calib.evidence.structure import structure_candidates
@@ -16,20 +16,19 @@ from calib.identify.fitting import Fit
 from calib.identify.holdout import HoldOut, hold_out, hold_out_of
 from calib.identify.signatures import EffectColumns, effect_columns
 from calib.model.columns import whitened_columns
+from calib.unknown import Estimate, estimates_of, linear_among
 
 
 @dataclass(frozen=True, eq=False)
 class Outlook:
     """What the error would be with one more effect, to first order.
 
-    ``values`` and ``sigmas`` (U,) are of all its unknowns, nonlinear ones included.
+    ``estimates`` (U) are of all its unknowns, nonlinear ones included.
     """
 
     rms_mm: float
     holdout: HoldOut
-    unknowns: tuple[Unknown, ...]
-    values: Array
-    sigmas: Array
+    estimates: tuple[Estimate, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +59,7 @@ class RunDiagnosis:
         values = one.values(finding.trial, np.array([e.value for e in finding.estimates]))
         signature = one.effect.signature(linear.situation, values)
         own = whitened_columns(signature, linear.situation) * one.known
-        sigma = np.array([unknown.sigma or 1e3 * unknown.size for unknown in one.unknowns])
+        sigma = np.array([unknown.prior_sigma for unknown in one.unknowns])
         larger = _Larger(
             np.concatenate([linear.jacobian, own]),
             np.concatenate([fitted.prior_precision, 1.0 / sigma**2]),
@@ -76,14 +75,11 @@ class RunDiagnosis:
         held = hold_out_of(
             rows, accepted, linear.whitened, larger.jacobian, larger.precision, larger.pull
         )
-        nonlinear = np.array([unknown.nonlinear for unknown in one.unknowns])
-        count = sigma.size
+        values = np.where(linear_among(one.unknowns), step[-sigma.size :], values)
         return Outlook(
             rms_mm=float(np.sqrt(np.mean(np.sum(natural**2, axis=0)))),
             holdout=held,
-            unknowns=one.unknowns,
-            values=np.where(nonlinear, values, step[-count:]),
-            sigmas=spread[-count:],
+            estimates=estimates_of(one.unknowns, values, spread[-sigma.size :]),
         )
 
 

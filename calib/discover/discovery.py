@@ -16,6 +16,7 @@ from calib.identify.fitting import Fit
 from calib.identify.holdout import hold_out
 from calib.identify.staged import fit_effects
 from calib.runs.stack import Rows
+from calib.unknown import linear_among
 
 SEED = 20_260_801
 """The null draws are the same every time: the same run gets the same answer."""
@@ -50,7 +51,7 @@ class RunStage:
         model = self.fit.model
         first, found = model.free.size, []
         for effect, group in zip(model.effects, model.unknowns, strict=True):
-            which = first + np.flatnonzero([not unknown.nonlinear for unknown in group])
+            which = first + np.flatnonzero(linear_among(group))
             first += len(group)
             sigma = self.fit.sigmas[which]
             distance = (self.fit.values[which] - model.centre[which]) / sigma

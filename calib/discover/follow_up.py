@@ -17,6 +17,7 @@ from calib.model.columns import whitened_columns
 from calib.model.prediction import Model, State
 from calib.poses.reach import PoseSet
 from calib.runs.stack import STEP_MM, STEP_RAD, Rows
+from calib.unknown import linear_among
 
 BASE_READS = 2
 """How often every base nest is read in a follow-up."""
@@ -120,7 +121,7 @@ class FollowUp:
     def columns(self, effect: Effect, values: Array, rows: Rows) -> Array:
         """Whitened derivatives (k, 3, N) by the linear unknowns of an effect."""
         situation = replace(self.situation, rows=rows)
-        linear = np.array([not unknown.nonlinear for unknown in effect.unknowns(rows)])
+        linear = linear_among(effect.unknowns(rows))
         shapes = whitened_columns(effect.signature(situation, values), situation)
         return np.asarray(shapes[: linear.size][linear])
 

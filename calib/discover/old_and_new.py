@@ -14,6 +14,7 @@ from calib.identify.fitting import Fit
 from calib.identify.signatures import EffectColumns
 from calib.model.columns import at_trial
 from calib.runs.stack import Rows
+from calib.unknown import linear_among
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +68,7 @@ class Together:
         model = fit.model
         self.own = [own_to_each_run(effect, model.rows) for effect in model.effects]
         new = [
-            [u.sigma or 1e3 * u.size for u in effect.unknowns(follow.rows) if not u.nonlinear]
+            [u.prior_sigma for u in effect.unknowns(follow.rows) if not u.nonlinear]
             for effect, own in zip(model.effects, self.own, strict=True)
             if own
         ]
@@ -90,7 +91,7 @@ class Together:
             model.effects, self.own, self.fit.linear.state.effects, model.unknowns, strict=True
         ):
             kept = np.zeros((len(group), *shape))
-            linear = np.array([not unknown.nonlinear for unknown in group])
+            linear = linear_among(group)
             if own:
                 count = len(effect.unknowns(follow.rows))
                 apart.append(follow.columns(effect, np.zeros(count), rows))

@@ -9,7 +9,7 @@ import numpy as np
 
 from calib.arrays import Array
 from calib.effects.tracker import rigid_motions
-from calib.evidence.candidate import Candidate, Term, fill_missing
+from calib.evidence.candidate import Candidate, fill_missing
 from calib.evidence.problem import LinearProblem
 from calib.evidence.quadratic import Neighbours, Quadratic, blocks_of
 from calib.evidence.structure import Carrier, Variable
@@ -30,9 +30,9 @@ def _candidate(fit: Fit, problem: LinearProblem, one: EffectColumns) -> Candidat
     missing = np.tile(~one.known[fit.accepted], 3)
     if missing.any():
         columns = fill_missing(problem, columns, missing)
-    terms = tuple(Term(u.name, u.unit, u.size, u.sigma) for u in one.unknowns if not u.nonlinear)
+    linear = tuple(unknown for unknown in one.unknowns if not unknown.nonlinear)
     subsets = one.effect.parts(fit.model.rows)
-    return Candidate(one.effect.id, terms, columns, one.trials, subsets=subsets)
+    return Candidate(one.effect.id, linear, columns, one.trials, subsets=subsets)
 
 
 def _accepted(fit: Fit, columns: Array) -> Array:

@@ -7,16 +7,15 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from calib.arrays import Array
 from calib.discover.agreement import TOGETHER_WORSE, runs_at_odds, untrue_uncertainties
 from calib.discover.diagnosis import RunDiagnosis
 from calib.discover.discovery import RunStage, stage_of
-from calib.effects.component import Unknown
 from calib.evidence.findings import Diagnosis, Finding
 from calib.evidence.forward import Discovery
 from calib.identify.fitting import Fit
 from calib.identify.report import bad_readings, quality
 from calib.identify.starting import MOVED
+from calib.unknown import Estimate, estimates_of, linear_among
 
 SMALLEST_P = 1e-300
 FEW_POSES = 15
@@ -80,15 +79,13 @@ def _quality(found: RunDiagnosis) -> dict[str, float | None]:
 
 def _candidate(found: RunDiagnosis, finding: Finding) -> dict[str, Any]:
     outlook = found.outlook(finding)
-    names = [unknown.name for unknown in outlook.unknowns]
-    acting = [name in finding.acting for name in names]
     return {
         "effect": finding.name,
         "p_value": max(finding.p_value, SMALLEST_P),
         "rms_after_um": _um(outlook.rms_mm),
         "holdout_rms_after_um": _um(outlook.holdout.rms_mm),
         "visible": finding.visible,
-        "parameters": _significant(outlook.unknowns, outlook.values, outlook.sigmas, acting),
+        "parameters": _significant(outlook.estimates, finding.acting),
     }
 
 
@@ -99,33 +96,32 @@ def effect_parameters(fit: Fit) -> list[dict[str, Any]]:
     for group in fit.model.unknowns:
         here = slice(at, at + len(group))
         at += len(group)
-        listed += _significant(group, fit.values[here], fit.sigmas[here], [False] * len(group))
+        listed += _significant(estimates_of(group, fit.values[here], fit.sigmas[here]))
     return listed
 
 
-def _significant(
-    unknowns: tuple[Unknown, ...], values: Array, sigmas: Array, acting: list[bool]
-) -> list[dict[str, Any]]:
+def _significant(estimates: Sequence[Estimate], acting: Sequence[str] = ()) -> list[dict[str, Any]]:
     """Entries of the unknowns that differ from zero; of all if none does or there is but one.
 
     Several linear unknowns of a kind share 5 %; nonlinear ones are always listed.
     """
-    linear = np.array([not unknown.nonlinear for unknown in unknowns])
+    linear = linear_among(estimate.unknown for estimate in estimates)
     limit = float(stats.norm.isf(0.025 / max(1, int(linear.sum()))))
-    clear = np.abs(values) > limit * sigmas
+    clear = np.array([abs(one.value) > limit * one.sigma for one in estimates])
     if linear.sum() == 1 or not np.any(clear & linear):
-        shown = linear & (np.array(acting) | ~np.any(acting))
+        chosen = np.array([estimate.name in acting for estimate in estimates])
+        shown = linear & (chosen | ~np.any(chosen))
     else:
         shown = clear & linear
     shown = shown | ~linear
     return [
         {
-            "name": unknown.name,
-            "value": float(value),
-            "sigma": float(sigma),
-            "unit": unknown.unit,
+            "name": estimate.name,
+            "value": estimate.value,
+            "sigma": estimate.sigma,
+            "unit": estimate.unit,
         }
-        for unknown, value, sigma, show in zip(unknowns, values, sigmas, shown, strict=True)
+        for estimate, show in zip(estimates, shown, strict=True)
         if show
     ]
 

@@ -27,23 +27,9 @@ from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.solve import Configuration
 from calib.runs.stack import Rows
+from calib.unknown import Unknown as Unknown
 
 Kind = Literal["machine", "measurement"]
-
-
-@dataclass(frozen=True)
-class Unknown:
-    """One unknown of an effect.
-
-    ``size`` is how large it may reasonably be; ``sigma`` the standard deviation of its prior, or
-    None where the data alone should speak. ``nonlinear`` unknowns are searched for first.
-    """
-
-    name: str
-    unit: str
-    size: float
-    sigma: float | None = None
-    nonlinear: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ whitened columns, one block for each trial of a nonlinear unknown), and answers 
 :class:`Diagnosis`.
 """
 
-from calib.evidence.candidate import Candidate, Term, fill_missing
+from calib.evidence.candidate import Candidate, fill_missing
 from calib.evidence.diagnosis import diagnose
 from calib.evidence.findings import Diagnosis, Finding, Unexplained
 from calib.evidence.forward import Discovery, Stage, Step, discover
@@ -27,7 +27,6 @@ __all__ = [
     "PureError",
     "Stage",
     "Step",
-    "Term",
     "Unexplained",
     "Variable",
     "blocks_of",

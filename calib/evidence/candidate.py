@@ -7,20 +7,7 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray, IntArray
 from calib.evidence.problem import LinearProblem
-
-
-@dataclass(frozen=True)
-class Term:
-    """One linear unknown of a candidate.
-
-    ``size`` is how large it may reasonably be, in ``unit``; it scales the columns, and with it
-    the hypotheses are weighed. ``sigma`` is the standard deviation of its prior, None for none.
-    """
-
-    name: str
-    unit: str = ""
-    size: float = 1.0
-    sigma: float | None = None
+from calib.unknown import Unknown
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +17,8 @@ class Candidate:
     Attributes
     ----------
     name : str
-    terms : tuple of k Term
-        Its linear unknowns.
+    unknowns : tuple of k Unknown
+        The linear ones.
     columns : (T, k, R)
         Whitened derivatives of the prediction by each unknown, for each of T trials of the
         nonlinear unknowns (T = 1 if there are none).
@@ -45,17 +32,20 @@ class Candidate:
     """
 
     name: str
-    terms: tuple[Term, ...]
+    unknowns: tuple[Unknown, ...]
     columns: Array
     trials: tuple[tuple[float, ...], ...] = ((),)
     subsets: tuple[tuple[int, ...], ...] = field(default=())
     channel: str = ""
 
     def __post_init__(self) -> None:
-        if self.columns.ndim != 3 or self.columns.shape[:2] != (len(self.trials), len(self.terms)):
+        if self.columns.ndim != 3 or self.columns.shape[:2] != (
+            len(self.trials),
+            len(self.unknowns),
+        ):
             raise ValueError(
                 f"{self.name}: columns have shape {self.columns.shape}, expected"
-                f" ({len(self.trials)}, {len(self.terms)}, rows)"
+                f" ({len(self.trials)}, {len(self.unknowns)}, rows)"
             )
         if not np.isfinite(self.columns).all():
             raise ValueError(f"{self.name}: columns are not finite; see fill_missing")
@@ -63,18 +53,17 @@ class Candidate:
     @cached_property
     def sizes(self) -> Array:
         """Sizes (k,) of the unknowns."""
-        return np.array([term.size for term in self.terms])
+        return np.array([unknown.size for unknown in self.unknowns])
 
     @cached_property
     def prior_precision(self) -> Array:
         """1 / sigma^2 (k,); where there is no prior, that of a thousand sizes."""
-        sigma = [term.sigma or 1e3 * term.size for term in self.terms]
-        return 1.0 / np.array(sigma) ** 2
+        return 1.0 / np.array([unknown.prior_sigma for unknown in self.unknowns]) ** 2
 
     @cached_property
     def hypotheses(self) -> tuple[tuple[int, ...], ...]:
         """The whole group first, then every subset that is smaller."""
-        whole = tuple(range(len(self.terms)))
+        whole = tuple(range(len(self.unknowns)))
         return (whole, *(subset for subset in dict.fromkeys(self.subsets) if subset != whole))
 
     @cached_property
@@ -85,19 +74,6 @@ class Candidate:
             np.array([one for one in self.hypotheses if len(one) == count], dtype=np.intp)
             for count in counts
         )
-
-
-def alone(terms: tuple[Term, ...]) -> tuple[tuple[int, ...], ...]:
-    """Subsets that may act alone: unknowns that share ``effect.member`` in their names.
-
-    ``backlash.leg3`` is one, ``screw-cyclic.leg1.sin`` and ``.cos`` are one together.
-    """
-    groups: dict[str, list[int]] = {}
-    for index, term in enumerate(terms):
-        groups.setdefault(".".join(term.name.split(".")[:2]), []).append(index)
-    if len(groups) < 2:
-        return ()
-    return tuple(tuple(members) for members in groups.values())
 
 
 def fill_missing(problem: LinearProblem, columns: Array, missing: BoolArray) -> Array:

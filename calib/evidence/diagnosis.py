@@ -12,7 +12,7 @@ import numpy as np
 from calib.arrays import Array
 from calib.evidence.bayes import observed
 from calib.evidence.candidate import Candidate
-from calib.evidence.findings import Dependence, Diagnosis, Estimate, Finding, Unexplained
+from calib.evidence.findings import Dependence, Diagnosis, Finding, Unexplained
 from calib.evidence.pairs import rivals
 from calib.evidence.problem import LinearProblem
 from calib.evidence.quadratic import Quadratic
@@ -26,6 +26,7 @@ from calib.evidence.rounds import (
 )
 from calib.evidence.scores import Scores, score
 from calib.evidence.weighing import chi_squares
+from calib.unknown import estimates_of
 
 ALPHA = 0.05
 DRAWS = 399
@@ -134,11 +135,8 @@ def _finding(judged: Round, index: int, evidence: float) -> Finding:
         chi2_fall=float(chi_squares(weighing, scores.scores[index][:, :, :1])[trial, 0]),
         dof=int(weighing.dof[trial]),
         trial=candidate.trials[trial],
-        acting=tuple(candidate.terms[term].name for term in subset),
-        estimates=tuple(
-            Estimate(term.name, float(value), float(sigma), term.unit)
-            for term, value, sigma in zip(candidate.terms, beta, sigmas, strict=True)
-        ),
+        acting=tuple(candidate.unknowns[index].name for index in subset),
+        estimates=estimates_of(candidate.unknowns, beta, sigmas),
         visible=scores.problem.visible(candidate.sizes[:, None] * candidate.columns[trial]),
         signature=signature,
     )

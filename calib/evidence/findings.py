@@ -7,16 +7,7 @@ import numpy as np
 from calib.arrays import Array
 from calib.evidence.family import Family
 from calib.evidence.scores import Scores
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """One unknown's value and standard uncertainty."""
-
-    name: str
-    value: float
-    sigma: float
-    unit: str
+from calib.unknown import Estimate
 
 
 @dataclass(frozen=True, eq=False)

@@ -75,7 +75,9 @@ class Scores:
         for candidate, weight, norm, stacks in zip(
             self.candidates, self.weights, self.norms, self._stacks, strict=True
         ):
-            soft = soft_test(weight, norm * candidate.sizes) if len(candidate.terms) > 1 else None
+            soft = (
+                soft_test(weight, norm * candidate.sizes) if len(candidate.unknowns) > 1 else None
+            )
             even = soft is None or not np.any(soft.dof < EVEN * stacks[0].dof)
             found.append(None if even else soft)
         return found

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from calib.arrays import Array
-from calib.evidence.candidate import Candidate, Term
+from calib.evidence.candidate import Candidate
+from calib.unknown import Unknown
 
 ORDER = 4
 """Highest order of the smooth functions (Legendre polynomials over the variable's range)."""
@@ -93,13 +94,13 @@ def _smooth(variable: Variable, carrier: Carrier) -> Candidate:
     subsets = [tuple(range(count * top)) for top in range(1, order)]
     if count > 1:
         subsets += [tuple(range(axis, count * order, count)) for axis in range(count)]
-    terms = tuple(
-        Term(f"{variable.name}.{carrier.name}{axis + 1}.P{power}", carrier.unit, carrier.size)
+    unknowns = tuple(
+        Unknown(f"{variable.name}.{carrier.name}{axis + 1}.P{power}", carrier.unit, carrier.size)
         for power in range(1, order + 1)
         for axis in range(count)
     )
     name = f"{variable.name} ({carrier.name})"
-    return Candidate(name, terms, columns, subsets=tuple(subsets), channel=variable.name)
+    return Candidate(name, unknowns, columns, subsets=tuple(subsets), channel=variable.name)
 
 
 def _legendre(scaled: Array, order: int) -> Array:
@@ -113,8 +114,8 @@ def _levels(variable: Variable, carrier: Carrier) -> Candidate:
     shapes = (variable.values == levels[:, None])[:, None, :]
     columns = (shapes * carrier.columns).reshape(1, -1, carrier.columns.shape[1])
     count = carrier.columns.shape[0]
-    terms = tuple(
-        Term(f"{variable.name}.{carrier.name}{axis + 1}.{level:g}", carrier.unit, carrier.size)
+    unknowns = tuple(
+        Unknown(f"{variable.name}.{carrier.name}{axis + 1}.{level:g}", carrier.unit, carrier.size)
         for level in levels
         for axis in range(count)
     )
@@ -122,7 +123,7 @@ def _levels(variable: Variable, carrier: Carrier) -> Candidate:
         tuple(range(count * level, count * (level + 1))) for level in range(levels.size)
     )
     name = f"{variable.name} ({carrier.name}, levels)"
-    return Candidate(name, terms, columns, subsets=subsets, channel=variable.name)
+    return Candidate(name, unknowns, columns, subsets=subsets, channel=variable.name)
 
 
 def _periodic(variable: Variable, carrier: Carrier) -> Candidate:
@@ -136,15 +137,15 @@ def _periodic(variable: Variable, carrier: Carrier) -> Candidate:
     columns = np.concatenate([np.sin(phase), np.cos(phase)], axis=1)
     columns *= np.concatenate([carrier.columns, carrier.columns])
     count = carrier.columns.shape[0]
-    terms = tuple(
-        Term(f"{variable.name}.{carrier.name}{axis + 1}.{wave}", carrier.unit, carrier.size)
+    unknowns = tuple(
+        Unknown(f"{variable.name}.{carrier.name}{axis + 1}.{wave}", carrier.unit, carrier.size)
         for wave in ("sin", "cos")
         for axis in range(count)
     )
     subsets = tuple((axis, count + axis) for axis in range(count)) if count > 1 else ()
     return Candidate(
         f"{variable.name} ({carrier.name}, periodic)",
-        terms,
+        unknowns,
         columns,
         trials=tuple((float(1.0 / f),) for f in frequencies),
         subsets=subsets,

@@ -31,8 +31,9 @@ from calib.formulas.expression import (
     parse_expression,
     vanishes_without,
 )
-from calib.formulas.formula_effect import NUMBERED, OWN, POINT, TRIALS, Declared, OperatorEffect
+from calib.formulas.formula_effect import NUMBERED, OWN, POINT, TRIALS, OperatorEffect
 from calib.toml_place import line_of, load_toml
+from calib.unknown import Unknown
 
 KINDS = ("machine", "measurement")
 _RANGE = ("from", "to")
@@ -70,7 +71,7 @@ def effect_from_text(text: str, source: str) -> OperatorEffect:
     return effect
 
 
-def _check(effect: OperatorEffect, declared: tuple[Declared, ...], read: "_Reader") -> None:
+def _check(effect: OperatorEffect, declared: tuple[Unknown, ...], read: "_Reader") -> None:
     """Every unknown is used, does something linear or has a range, and zero means no effect."""
     for one in declared:
         if not any(one.name in expression.names for expression in effect.expressions):
@@ -141,24 +142,24 @@ class _Reader:
             )
         return tuple(parse_expression(one, self.place("expression")) for one in given)
 
-    def unknowns(self) -> tuple[Declared, ...]:
+    def unknowns(self) -> tuple[Unknown, ...]:
         table = self.table.get("unknowns")
         if not isinstance(table, dict) or not table:
             raise self.fault("unknowns", "no unknowns are declared", 'Write { k = "1/mm" }')
         return tuple(self._unknown(name, value) for name, value in table.items())
 
-    def _unknown(self, name: str, value: object) -> Declared:
+    def _unknown(self, name: str, value: object) -> Unknown:
         taken = {*OWN, *POINT, *FUNCTIONS, *CONSTANTS, "t"}
         if not re.fullmatch(r"[A-Za-z_]\w*", name) or name in taken or NUMBERED.fullmatch(name):
             raise self.fault("unknowns", f"an unknown cannot be called {name!r}", "Rename it")
         if isinstance(value, str):
-            return Declared(name, value, None, None, None, TRIALS)
+            return Unknown(name, value, steps=TRIALS)
         if not isinstance(value, dict) or not isinstance(value.get("unit", ""), str):
             raise self.fault("unknowns", f"{name} is {value!r}", f'Write {name} = "its unit"')
         extra = set(value) - {"unit", "size", "sigma", "from", "to", "steps"}
         if extra:
             raise self.fault("unknowns", f"{name} has an unknown key {min(extra)!r}")
-        numbers = {key: self._number(name, key, value.get(key)) for key in ("size", "sigma")}
+        size, sigma = (self._number(name, key, value.get(key)) for key in ("size", "sigma"))
         low, high = (self._number(name, key, value.get(key), any_sign=True) for key in _RANGE)
         if (low is None) != (high is None) or (
             low is not None and high is not None and low >= high
@@ -168,8 +169,13 @@ class _Reader:
         if not isinstance(steps, int) or isinstance(steps, bool) or not 2 <= steps <= 400:
             raise self.fault("unknowns", f"{name}: steps is {steps!r}", "Expected 2 to 400")
         bounds = None if low is None or high is None else (low, high)
-        return Declared(
-            name, value.get("unit", "1"), numbers["size"], numbers["sigma"], bounds, steps
+        return Unknown(
+            name,
+            value.get("unit", "1"),
+            math.nan if size is None else size,
+            sigma,
+            bounds=bounds,
+            steps=steps,
         )
 
     def _number(self, name: str, key: str, value: object, any_sign: bool = False) -> float | None:

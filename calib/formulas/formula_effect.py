@@ -1,8 +1,9 @@
 """An effect given by formulas: its columns by forward differentiation (see ``operator.py``)."""
 
+import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,18 +24,6 @@ POINT = ("x", "y", "z", "range", "azimuth", "elevation")
 NUMBERED = re.compile(r"(s|q|l|direction|step)([1-9]\d*)")
 
 
-@dataclass(frozen=True)
-class Declared:
-    """An unknown as the file declares it."""
-
-    name: str
-    unit: str
-    size: float | None
-    sigma: float | None
-    bounds: tuple[float, float] | None
-    steps: int
-
-
 class OperatorEffect(Effect):
     """An effect given by formulas; see the module's text."""
 
@@ -44,7 +33,7 @@ class OperatorEffect(Effect):
         says: str,
         kind: Kind,
         expressions: tuple[Expression, ...],
-        declared: tuple[Declared, ...],
+        declared: tuple[Unknown, ...],
         shared: bool,
         acts_on: str,
         source: str,
@@ -98,14 +87,14 @@ class OperatorEffect(Effect):
         limbs = [""] if self._common else [f"{axis.name}." for axis in rows.machine.axes]
         sizes = self._sizes(rows)
         found = [
-            Unknown(f"{self.id}.{limb}{one.name}", one.unit, one.size or sizes[one.name], one.sigma)
+            replace(one, name=f"{self.id}.{limb}{one.name}", size=_stated(one, sizes[one.name]))
             for limb in limbs
             for one in self.linear
         ]
         for one in self.searched:
             low, high = one.bounds or (1.0, 1.0)
-            size = one.size or 0.5 * abs(high - low)
-            found.append(Unknown(f"{self.id}.{one.name}", one.unit, size, one.sigma, True))
+            size = _stated(one, 0.5 * abs(high - low))
+            found.append(replace(one, name=f"{self.id}.{one.name}", size=size, nonlinear=True))
         return tuple(found)
 
     @property
@@ -240,7 +229,12 @@ class OperatorEffect(Effect):
         return columns
 
 
-def _grid(one: Declared) -> Array:
+def _stated(one: Unknown, usual: float) -> float:
+    """Size that the file states, else the usual one."""
+    return usual if math.isnan(one.size) else one.size
+
+
+def _grid(one: Unknown) -> Array:
     low, high = one.bounds or (1.0, 1.0)
     if low > 0.0 and high / low > 3.0:
         return np.geomspace(low, high, one.steps)

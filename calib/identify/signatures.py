@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.arrays import Array, BoolArray
-from calib.effects.component import Effect, Unknown
+from calib.effects.component import Effect
 from calib.identify.fitting import Fit
 from calib.model.columns import at_trial, channels_known, whitened_columns
+from calib.unknown import Unknown, linear_among
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +29,7 @@ class EffectColumns:
     def values(self, trial: tuple[float, ...], amplitudes: Array) -> Array:
         """Values of all unknowns (U,): nonlinear ones at a trial, linear ones as given."""
         values = at_trial(self.unknowns, trial)
-        values[[not unknown.nonlinear for unknown in self.unknowns]] = amplitudes
+        values[linear_among(self.unknowns)] = amplitudes
         return values
 
 
@@ -47,7 +48,7 @@ def columns_at(fit: Fit, effect: Effect, trials: tuple[tuple[float, ...], ...]) 
     """Signatures of one effect at given trial values."""
     rows, situation = fit.model.rows, fit.linear.situation
     unknowns = effect.unknowns(rows)
-    linear = [not unknown.nonlinear for unknown in unknowns]
+    linear = linear_among(unknowns)
     columns = np.empty((len(trials), sum(linear), 3, rows.count))
     for trial, own in zip(trials, columns, strict=True):
         signature = effect.signature(situation, at_trial(unknowns, trial))

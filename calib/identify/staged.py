@@ -79,7 +79,7 @@ def _best_trial(latest: Fit, one: EffectColumns) -> tuple[int, Array]:
     columns = one.columns[..., latest.accepted]
     columns = columns.reshape(*one.columns.shape[:2], -1)
     projected = problem.project(columns)
-    sizes = np.array([u.sigma or 1e3 * u.size for u in one.unknowns if not u.nonlinear])
+    sizes = np.array([u.prior_sigma for u in one.unknowns if not u.nonlinear])
     weight = columns @ projected.swapaxes(1, 2) + np.diag(1.0 / sizes**2)
     scores = columns @ problem.residual
     amplitudes = np.linalg.solve(weight, scores[:, :, None])[:, :, 0]

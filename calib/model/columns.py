@@ -5,16 +5,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from calib.arrays import Array, BoolArray
-from calib.effects.component import Effect, Signature, Situation, Unknown
+from calib.effects.component import Effect, Signature, Situation
 from calib.effects.lever import apply_each, through
 from calib.mechanism.rigid import rotate
 from calib.runs.stack import Rows
+from calib.unknown import Unknown, linear_among
 
 
 def at_trial(unknowns: Sequence[Unknown], trial: Sequence[float]) -> Array:
     """Values (U,) of an effect that does nothing yet, its nonlinear unknowns at a trial."""
     values = np.zeros(len(unknowns))
-    values[[index for index, unknown in enumerate(unknowns) if unknown.nonlinear]] = trial
+    values[~linear_among(unknowns)] = trial
     return values
 
 

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from calib.arrays import Array, BoolArray, IntArray
-from calib.effects.component import Effect, Signature, Situation, Unknown
+from calib.effects.component import Effect, Signature, Situation
 from calib.effects.lever import apply, apply_each, through
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
@@ -26,6 +26,7 @@ from calib.mechanism.rigid import cross, exponential, product, rotate
 from calib.mechanism.solve import Configuration, begun_at, forward, home_configuration
 from calib.model.columns import at_trial, change_of, channels_known, whitened_columns
 from calib.runs.stack import Rows
+from calib.unknown import Unknown, linear_among
 
 SETTLING_PASSES = 4
 SETTLED = 1e-8
@@ -114,12 +115,8 @@ class Model:
 
     @cached_property
     def prior(self) -> Array:
-        """Standard deviation of the prior of every unknown (p,); infinite for frames.
-
-        Unknowns of effects without a prior of their own get a thousand times their size: enough
-        to keep collinear effects solvable, too weak to bias anything.
-        """
-        effects = [u.sigma or 1e3 * u.size for group in self.unknowns for u in group]
+        """Standard deviation of the prior of every unknown (p,); infinite for frames."""
+        effects = [u.prior_sigma for group in self.unknowns for u in group]
         parameters = self.machine.prior_sigma[self.free]
         return np.concatenate([parameters, effects, np.full(6 * self.frames, np.inf)])
 
@@ -314,7 +311,7 @@ class Model:
     def _linear(self, state: State) -> list[Array]:
         """Values of every effect with zero in place of its nonlinear unknowns."""
         return [
-            np.where([u.nonlinear for u in group], 0.0, values - effect.rest(self.rows))
+            np.where(linear_among(group), values - effect.rest(self.rows), 0.0)
             for effect, group, values in zip(
                 self.effects, self.unknowns, state.effects, strict=True
             )
@@ -336,7 +333,7 @@ class Model:
         at, effects = self.free.size, []
         for group, values in zip(self.unknowns, state.effects, strict=True):
             moved = values + step[at : at + values.size]
-            scanned = np.array([unknown.nonlinear for unknown in group])
+            scanned = ~linear_among(group)
             # A period or a time constant has a sign: it moves by half of itself at most.
             near = np.clip(moved, 0.5 * values, 1.5 * values)
             effects.append(np.where(scanned & (values > 0), near, moved))
@@ -358,7 +355,7 @@ class Model:
         own = np.concatenate([state.parameters[self.free], *state.effects])
         deviation = np.zeros(self.prior.size)
         deviation[: own.size] = own - self.centre[: own.size]
-        scanned = [unknown.nonlinear for group in self.unknowns for unknown in group]
+        scanned = ~linear_among(unknown for group in self.unknowns for unknown in group)
         deviation[self.free.size : own.size][scanned] = 0.0
         return deviation
 

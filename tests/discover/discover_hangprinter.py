@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
-from calib.evidence import Candidate, LinearProblem, Term, fill_missing
+from calib.evidence import Candidate, LinearProblem, fill_missing
+from calib.unknown import Unknown
 
 FILE = Path(__file__).parents[1] / "data" / "real" / "hangprinter" / "hp4_force_series2.json"
 SIGMA = 1.03
@@ -102,6 +103,6 @@ class Hangprinter:
             whitened = np.reshape(shapes, (len(shapes), -1)) / SIGMA
             if name == "line-flex":
                 whitened = fill_missing(problem, whitened, missing)
-            terms = tuple(Term(f"{name}.{k}", unit, size) for k in range(len(shapes)))
+            terms = tuple(Unknown(f"{name}.{k}", unit, size) for k in range(len(shapes)))
             answer.append(Candidate(name, terms, whitened[None]))
         return answer

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from calib.evidence import Candidate, LinearProblem, Term
+from calib.evidence import Candidate, LinearProblem
+from calib.unknown import Unknown
 
 FILE = Path(__file__).parents[1] / "data" / "real" / "mmt" / "k_and_e.dat"
 SIGMA = 0.65
@@ -65,7 +66,7 @@ def problem(fitted):
 def candidates(fitted):
     """Every term that is not fitted; sizes of ten arc seconds."""
     return [
-        Candidate(name, (Term(name, "arcsec", 10.0),), columns.reshape(1, 1, -1) / SIGMA)
+        Candidate(name, (Unknown(name, "arcsec", 10.0),), columns.reshape(1, 1, -1) / SIGMA)
         for name, columns in terms().items()
         if name not in fitted
     ]

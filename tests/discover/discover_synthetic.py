@@ -9,11 +9,11 @@ from calib.evidence import (
     Carrier,
     Diagnosis,
     LinearProblem,
-    Term,
     Variable,
     structure_candidates,
 )
 from calib.evidence.quadratic import Neighbours
+from calib.unknown import Unknown
 
 POSES = 45
 
@@ -76,7 +76,7 @@ class Lab:
 
     def effect(self, name, columns, trials=((),)):
         columns = columns if columns.ndim == 3 else columns[None]
-        terms = tuple(Term(f"{name}.{k}", "mm", 2.0) for k in range(columns.shape[1]))
+        terms = tuple(Unknown(f"{name}.{k}", "mm", 2.0) for k in range(columns.shape[1]))
         alone = tuple((k,) for k in range(len(terms))) if name == "backlash" else ()
         return Candidate(name, terms, columns, trials, alone)
 

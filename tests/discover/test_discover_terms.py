@@ -9,19 +9,20 @@ from discover_synthetic import POSES, Lab
 
 from app.files.runs import read_runs
 from calib.discover.terms import library, propose
-from calib.evidence import Candidate, Term
+from calib.evidence import Candidate
 from calib.evidence.terms import select_terms
 from calib.formulas.effect_file import effect_from_text
 from calib.identify import fit
 from calib.model import Model
 from calib.runs.stack import stack
+from calib.unknown import Unknown
 
 RUNS = Path(__file__).parents[1] / "data" / "runs"
 
 
 def term(name, columns, trials=((),)):
     columns = columns if columns.ndim == 3 else columns[None]
-    names = tuple(Term(f"{name}.{k}", "mm", 2.0) for k in range(columns.shape[1]))
+    names = tuple(Unknown(f"{name}.{k}", "mm", 2.0) for k in range(columns.shape[1]))
     return Candidate(name, names, columns, trials)
 
 

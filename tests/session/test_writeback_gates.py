@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from app.errors import GateRefused
-from app.files.fits import Estimate, SavedFit
+from app.files.fits import SavedFit
 from app.files.machines import load_machine
 from app.writeback.gates import Gates, gates_of_check, gates_of_proposal, refuse_if_any
 from app.writeback.proposal import propose
 from calib.errors import BadInput
 from calib.pose_error import Summary
+from calib.unknown import Estimate, Unknown
 
 MACHINE = load_machine("hexapod")
 NOMINAL = {p.name: p.nominal for p in MACHINE.parameters}
@@ -27,7 +28,7 @@ def made(effects: tuple[str, ...] = (), sigma: float = 5e-3, **changes: float) -
     """A fit near nominal, with ``changes`` by parameter name (dots as ``__``)."""
     values = {**NOMINAL, "leg1.L0": NOMINAL["leg1.L0"] + 0.1}
     values |= {name.replace("__", "."): value for name, value in changes.items()}
-    estimates = {n: Estimate(n, v, sigma, "mm", True) for n, v in values.items()}
+    estimates = {n: Estimate(Unknown(n, "mm"), v, sigma) for n, v in values.items()}
     quality = {"chi2_per_dof": 1.0, "holdout_rms_um": 9.0, "holdout_floor_um": 9.0}
     covariance = sigma**2 * np.eye(len(estimates))
     return SavedFit("made.toml", "hexapod", effects, estimates, quality, covariance, True)

@@ -9,7 +9,7 @@ import pytest
 from session_mock import POSES, Heard, Mock
 
 from app.errors import GateRefused, StoppedByOperator
-from app.files.fits import Estimate, SavedFit, read_fit
+from app.files.fits import SavedFit, read_fit
 from app.files.models import write_model
 from app.files.runs import read_run
 from app.session import PlanOptions, Session, measure_plan
@@ -23,6 +23,7 @@ from calib.identify import fit
 from calib.model import Model
 from calib.poses import verification_poses
 from calib.runs.stack import stack
+from calib.unknown import Estimate, Unknown
 from drivers.errors import DeviceError, ParameterError
 
 # Three check poses are enough here.
@@ -84,7 +85,9 @@ async def test_apply_corrects_the_machine_and_undo_brings_the_old_set_back(
 def small_change(station: Station, by: float = 0.02) -> SavedFit:
     """A fit that passes every gate before writing: nominal, but for one leg's length."""
     estimates = {
-        p.name: Estimate(p.name, p.nominal + (by if p.name == "leg1.L0" else 0.0), 1e-3, "mm", True)
+        p.name: Estimate(
+            Unknown(p.name, "mm"), p.nominal + (by if p.name == "leg1.L0" else 0.0), 1e-3
+        )
         for p in station.site.machine.parameters
     }
     quality = {"chi2_per_dof": 1.0, "holdout_rms_um": 9.0, "holdout_floor_um": 9.0}

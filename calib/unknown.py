@@ -1,0 +1,83 @@
+"""Unknowns of effects and of candidates, and what is found for them."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib.arrays import Array, BoolArray
+
+VAGUE = 1e3
+"""Sizes in the standard deviation of an unknown without a prior of its own."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A named number that a fit finds.
+
+    Attributes
+    ----------
+    name, unit : str
+    size : float
+        How large it may reasonably be, in ``unit``: hypotheses are weighed with it. nan where
+        only the readings can tell.
+    sigma : float or None
+        Standard deviation of its prior; None where the data alone should speak.
+    nonlinear : bool
+        Whether it is searched for, at trial values, before a fit can move it.
+    bounds, steps
+        Range and number of the trial values, where these are declared beforehand.
+    """
+
+    name: str
+    unit: str = ""
+    size: float = math.nan
+    sigma: float | None = None
+    nonlinear: bool = False
+    bounds: tuple[float, float] | None = None
+    steps: int = 0
+
+    @property
+    def prior_sigma(self) -> float:
+        """Standard deviation of its prior; without one, a thousand times its size.
+
+        That is enough to keep collinear effects solvable, and too weak to bias anything.
+        """
+        return self.sigma or VAGUE * self.size
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What was found for an unknown: value and standard uncertainty, in its unit.
+
+    ``identified`` is false where the readings leave it open.
+    """
+
+    unknown: Unknown
+    value: float
+    sigma: float
+    identified: bool = True
+
+    @property
+    def name(self) -> str:
+        """Name of the unknown."""
+        return self.unknown.name
+
+    @property
+    def unit(self) -> str:
+        """Unit of value and sigma."""
+        return self.unknown.unit
+
+
+def linear_among(unknowns: Iterable[Unknown]) -> BoolArray:
+    """Which unknowns (U,) move the readings linearly."""
+    return np.array([not unknown.nonlinear for unknown in unknowns], dtype=bool)
+
+
+def estimates_of(unknowns: Sequence[Unknown], values: Array, sigmas: Array) -> tuple[Estimate, ...]:
+    """Values (U,) and standard uncertainties (U,) beside their unknowns."""
+    return tuple(
+        Estimate(unknown, float(value), float(sigma))
+        for unknown, value, sigma in zip(unknowns, values, sigmas, strict=True)
+    )
