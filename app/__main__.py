@@ -1,5 +1,7 @@
 """``python -m app`` is ``pkmcal``."""
 
-from app.cli import main
+import runpy
 
-main()
+from app.again import WAY_IN
+
+runpy.run_path(str(WAY_IN), run_name="__main__")

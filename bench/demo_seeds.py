@@ -18,7 +18,7 @@ def main(arguments: list[str]) -> None:
     print("seed   before um   after um   after deg   seconds")
     for seed in range(1, count + 1):
         with tempfile.TemporaryDirectory() as folder:
-            command = [sys.executable, "-m", "app", "demo", "--json", "--seed", str(seed)]
+            command = [sys.executable, "-m", "pkmcal", "demo", "--json", "--seed", str(seed)]
             done = subprocess.run(
                 [*command, "--out", str(Path(folder) / "demo")],
                 capture_output=True,

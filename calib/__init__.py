@@ -1,1 +1,3 @@
 """The mathematics: mechanisms, identification, discovery. Pure functions over small records."""
+
+PART_OF = "pkmcal"

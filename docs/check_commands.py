@@ -35,7 +35,7 @@ def commands_of(page: Path) -> list[tuple[str, list[str]]]:
 
 def missing(command: str, shown: list[str]) -> list[str]:
     """Lines shown that the command does not print."""
-    words = [sys.executable, "-m", "app", *shlex.split(command, comments=True)]
+    words = [sys.executable, "-m", "pkmcal", *shlex.split(command, comments=True)]
     done = subprocess.run(
         words, cwd=HERE, stdout=subprocess.PIPE, text=True, timeout=LONGEST_S, check=False
     )

@@ -1,1 +1,3 @@
 """Hardware links: CANopen controllers, emScon laser trackers, serial controllers."""
+
+PART_OF = "pkmcal"

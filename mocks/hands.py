@@ -1,4 +1,4 @@
-"""One command to a running station: ``python -m mocks.hands SITE payload kg=10``.
+"""One command to a running station: ``pkmcal mock do SITE payload kg=10``.
 
 SITE is the site file that the station wrote, or the address of its control socket; the commands
 are those of ``mocks.control``. The answer is one line of JSON on standard output; exit code 2 if

@@ -1,4 +1,4 @@
-"""A mock station as a process of its own: ``python -m mocks.station hexapod --json``.
+"""A mock station as a process of its own: ``pkmcal mock hexapod --json``.
 
 It prints its addresses and runs until SIGINT, SIGTERM or (``--until-stdin-closes``) the end of
 its standard input. With ``--json`` the one line on standard output is::

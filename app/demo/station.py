@@ -3,13 +3,13 @@
 import json
 import queue
 import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from app.again import command_of
 from drivers.errors import ConnectFailed
 
 START_DEADLINE_S = 30.0
@@ -26,7 +26,7 @@ def mock_station(machine: str, seed: int, scale: float, folder: Path) -> Iterato
         If it does not say its addresses within :data:`START_DEADLINE_S`.
     """
     site, complaints = folder / "site.toml", folder / "station.log"
-    command = [sys.executable, "-m", "mocks.station", machine, "--json", "--until-stdin-closes"]
+    command = command_of("mock", machine, "--json", "--until-stdin-closes")
     command += ["--seed", str(seed), "--scale", str(scale), "--smrs", "3"]
     command += ["--site", str(site), "--nvm", str(folder / "controller-memory.json")]
     with complaints.open("w", encoding="utf-8") as log:

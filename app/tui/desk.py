@@ -7,11 +7,11 @@ them on the banner. Nothing here draws.
 import asyncio
 import contextlib
 import json
-import sys
 from collections.abc import Coroutine, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
+from app.again import command_of
 from app.errors import GateRefused, StoppedByOperator
 from app.files.site import Site, load_site, site_of_mock
 from app.session import events as ev
@@ -78,7 +78,7 @@ class Desk:
         # However this program ends, its mock's standard input ends with it, and so does the mock.
         ends_with_us = ("--json", "--until-stdin-closes")
         process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "mocks.station", *arguments, *ends_with_us),
+            *command_of("mock", *arguments, *ends_with_us),
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE,

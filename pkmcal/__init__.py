@@ -1,0 +1,1 @@
+"""Calibrate parallel-kinematic machines."""
