@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.arrays import Array, BoolArray
-from calib.discover.problem import quadratics_of, variables_of
+from calib.discover.problem import accepted, each_leg, every_leg, quadratics_of, variables_of
 from calib.evidence.compare import Speaking, Together, compare_structure
 from calib.evidence.repeats import PureError, pure_error
 from calib.evidence.structure import Carrier, Variable
 from calib.identify.fitting import Fit
+from calib.mechanism.axes import units_of
 from calib.mechanism.rigid import rotate
 
 
@@ -86,7 +87,7 @@ def _of_reading(fit: Fit) -> list[Variable]:
     rows, situation, kept = fit.model.rows, fit.linear.situation, fit.accepted
     count = fit.readings
     x, y, z = situation.point[:, kept]
-    points = Carrier("point", _flat(np.swapaxes(rows.whitener, 0, 1)[:, :, kept]))
+    points = Carrier("point", accepted(fit, np.swapaxes(rows.whitener, 0, 1)))
     turned = np.moveaxis(situation.frame_rotation, 1, 0)
     platform = [
         rotate(situation.rotation, axis[:, None] * np.ones(rows.count)) for axis in np.eye(3)
@@ -96,25 +97,27 @@ def _of_reading(fit: Fit) -> list[Variable]:
     seats = seats * rows.on_platform
     labels = {name: number for number, name in enumerate(dict.fromkeys(rows.nest_name))}
     nest = np.array([labels[name] for name in rows.nest_name], dtype=np.float64)[kept]
-    unit = rows.machine.actuators[0].unit
-    moved = _flat(situation.actuator_columns[:, :, kept])
-    legs = Carrier("legs", moved, unit, 0.01 if unit == "mm" else 1e-4)
     found = [
         Variable("range", np.tile(np.sqrt(x**2 + y**2 + z**2), 3), (points,)),
         Variable("azimuth", np.tile(np.unwrap(np.arctan2(y, x)), 3), (points,)),
         Variable("elevation", np.tile(np.arctan2(z, np.hypot(x, y)), 3), (points,)),
-        Variable(
-            "nest", np.tile(nest, 3), (Carrier("seat", _flat(seats[:, :, kept])),), ("levels",)
-        ),
+        Variable("nest", np.tile(nest, 3), (Carrier("seat", accepted(fit, seats)),), ("levels",)),
     ]
     if np.any(rows.step):
-        found.append(Variable("step", np.tile(rows.step[:, kept], (1, 3)), (legs,)))
+        found += _steps(fit)
     return [one for one in found if one.values.shape[-1] == 3 * count]
 
 
-def _flat(columns: Array) -> Array:
-    """(c, 3, A) -> (c, 3 A)."""
-    return np.ascontiguousarray(columns.reshape(columns.shape[0], -1))
+def _steps(fit: Fit) -> list[Variable]:
+    """Size of the last step: of all actuators together, or of each where their units differ."""
+    rows = fit.model.rows
+    steps = np.tile(rows.step[:, fit.accepted], (1, 3))
+    if len(units_of(rows.machine.axes)) == 1:
+        return [Variable("step", steps, (every_leg(fit),))]
+    return [
+        Variable(f"step{k + 1}", step, (leg,))
+        for k, (step, leg) in enumerate(zip(steps, each_leg(fit), strict=True))
+    ]
 
 
 def _repeats(fit: Fit, which: BoolArray) -> PureError:

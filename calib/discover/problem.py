@@ -26,7 +26,7 @@ def effect_candidates(
 
 
 def _candidate(fit: Fit, problem: LinearProblem, one: EffectColumns) -> Candidate:
-    columns = _accepted(fit, one.columns)
+    columns = accepted(fit, one.columns)
     missing = np.tile(~one.known[fit.accepted], 3)
     if missing.any():
         columns = fill_missing(problem, columns, missing)
@@ -35,7 +35,24 @@ def _candidate(fit: Fit, problem: LinearProblem, one: EffectColumns) -> Candidat
     return Candidate(one.effect.id, linear, columns, one.trials, subsets=subsets)
 
 
-def _accepted(fit: Fit, columns: Array) -> Array:
+def every_leg(fit: Fit) -> Carrier:
+    """The extensions of all actuators, each in its own unit."""
+    axes = fit.model.rows.machine.axes
+    columns = accepted(fit, fit.linear.situation.actuator_columns)
+    units = tuple(axis.unit for axis in axes)
+    return Carrier("legs", columns, units, tuple(axis.usual_error for axis in axes))
+
+
+def each_leg(fit: Fit) -> list[Carrier]:
+    """The extension of one actuator, for every actuator."""
+    legs = every_leg(fit)
+    return [
+        Carrier(f"leg{k + 1}", legs.columns[[k]], *legs.scale(k))
+        for k in range(legs.columns.shape[0])
+    ]
+
+
+def accepted(fit: Fit, columns: Array) -> Array:
     """(..., 3, N) -> (..., 3 A), contiguous."""
     chosen = columns if fit.accepted.all() else columns[..., fit.accepted]
     return np.ascontiguousarray(chosen.reshape(*columns.shape[:-2], -1))
@@ -50,15 +67,11 @@ def _rows_of(fit: Fit, values: Array) -> Array:
 def variables_of(fit: Fit) -> list[Variable]:
     """Everything that the residual could depend on, with what it could act on."""
     rows, situation = fit.model.rows, fit.linear.situation
-    columns = _accepted(fit, situation.actuator_columns)
-    unit = rows.machine.actuators[0].unit if rows.machine.actuators else "mm"
-    size = 0.01 if unit == "mm" else 1e-4
-    legs = Carrier("legs", columns, unit, size)
-    own = [Carrier(f"leg{k + 1}", columns[[k]], unit, size) for k in range(columns.shape[0])]
-    points = Carrier("point", _accepted(fit, np.swapaxes(rows.whitener, 0, 1)), "mm", 0.01)
+    legs, own, axes = every_leg(fit), each_leg(fit), rows.machine.axes
+    points = Carrier("point", accepted(fit, np.swapaxes(rows.whitener, 0, 1)), "mm", 0.01)
     found = [
-        Variable(f"q{k + 1}", _rows_of(fit, s), (leg,), ("smooth", "periodic"), _shortest(unit))
-        for k, (s, leg) in enumerate(zip(rows.extension, own, strict=True))
+        Variable(f"q{k + 1}", _rows_of(fit, s), (leg,), ("smooth", "periodic"), axis.shortest)
+        for k, (s, leg, axis) in enumerate(zip(rows.extension, own, axes, strict=True))
     ]
     found.append(Variable("direction", _rows_of(fit, rows.direction), (legs,)))
     found.append(
@@ -76,11 +89,6 @@ def variables_of(fit: Fit) -> list[Variable]:
     coordinates = np.concatenate([situation.position, to_euler(situation.rotation)])
     found += [Variable("pose", _rows_of(fit, values), (legs,)) for values in coordinates]
     return found
-
-
-def _shortest(unit: str) -> float:
-    """Shortest period along an actuator that is tried: a millimetre, or a degree and a bit."""
-    return 1.0 if unit == "mm" else 2.0 * np.pi / 200.0
 
 
 def quadratics_of(fit: Fit) -> list[Quadratic]:
@@ -103,6 +111,6 @@ def quadratics_of(fit: Fit) -> list[Quadratic]:
         f"{run} {name}" if on else ""
         for run, name, on in zip(rows.run, rows.pose_name, rows.on_platform, strict=True)
     ]
-    kept = [label for label, accepted in zip(labels, fit.accepted, strict=True) if accepted]
-    blocks = blocks_of(kept * 3, _accepted(fit, whitened))
+    kept = [label for label, good in zip(labels, fit.accepted, strict=True) if good]
+    blocks = blocks_of(kept * 3, accepted(fit, whitened))
     return [*found, blocks] if blocks is not None else found

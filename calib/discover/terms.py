@@ -6,7 +6,7 @@ themselves where that keeps numbers readable.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from calib.formulas.effect_file import effect_from_text
 from calib.formulas.formula_effect import OperatorEffect
 from calib.identify.fitting import Fit
 from calib.identify.signatures import effect_columns
+from calib.mechanism.axes import units_of
 
 PERIODS = 48
 
@@ -26,7 +27,8 @@ class Formula:
     """One entry of the library.
 
     ``text`` holds the unknowns as ``{a}``, ``{b}`` ... with ``units``; ``searched`` is a nonlinear
-    unknown as (name, unit, from, to) or None.
+    unknown as (name, unit, from, to) or None; ``axes`` names the actuators that it is for, where
+    these are not all.
     """
 
     text: tuple[str, ...]
@@ -34,6 +36,7 @@ class Formula:
     acts_on: str
     shared: bool
     searched: tuple[str, str, float, float] | None = None
+    axes: tuple[str, ...] = ()
 
     def table(self, identifier: str, says: str, letters: Sequence[str]) -> str:
         """The formula as the text of an effect file."""
@@ -54,7 +57,12 @@ class Formula:
             f"expression = {parts[0] if len(parts) == 1 else '[' + ', '.join(parts) + ']'}",
             f"unknowns = {{ {', '.join(unknowns)} }}",
         ]
-        return "\n".join([*lines, *(["shared = true"] if self.shared else [])]) + "\n"
+        if self.shared:
+            lines.append("shared = true")
+        if self.axes:
+            axes = [f'"{name}"' for name in self.axes]
+            lines.append(f"axes = [{', '.join(axes)}]")
+        return "\n".join(lines) + "\n"
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +88,27 @@ class Proposal:
 
 
 def library(fit: Fit) -> list[Formula]:
-    """Formulas in actuator space (one for all, or one each) and in point space."""
-    rows = fit.model.rows
-    unit = rows.machine.actuators[0].unit if rows.machine.actuators else "mm"
+    """Formulas in actuator space (one for all of a unit, or one each) and in point space."""
+    axes = fit.model.rows.machine.axes
+    units = units_of(axes)
+    varying = _varying(fit)
+    found = []
+    for unit, own in units.items():
+        named = tuple(axes[index].name for index in own) if len(units) > 1 else ()
+        found += [replace(formula, axes=named) for formula in _of_actuators(fit, unit, varying)]
+    found += [_along(_centred(*one), f"mm per unit of {one[0]}") for one in varying]
+    found += _points_of_time(fit)
+    for text in ("range**2", "range**3", "elevation", "elevation**2", "sin(2*azimuth)"):
+        found.append(Formula((f"{{a}} * {text}",), ("mm",), "point", True))
+    waves = ("sin(azimuth)", "cos(azimuth)", "sin(2*azimuth)", "cos(2*azimuth)", "elevation**2")
+    found += [_along(one, "mm") for one in waves]
+    return found
+
+
+def _of_actuators(
+    fit: Fit, unit: str, varying: Sequence[tuple[str, float, float]]
+) -> list[Formula]:
+    """Formulas of actuators in ``unit``: of their own motion, of channels, of time."""
     own = [
         (("{a} * s**2",), (f"1/{unit}",)),
         (("{a} * s**3",), (f"1/{unit}^2",)),
@@ -95,15 +121,18 @@ def library(fit: Fit) -> list[Formula]:
     found = [
         Formula(text, units, "actuator", shared) for text, units in own for shared in (True, False)
     ]
-    for name, low, high in _varying(fit):
-        centre = f"({name} - {0.5 * (low + high):.6g})"
-        found += _of_channel(centre, name, unit)
-    found += _of_time(fit, unit)
-    for text in ("range**2", "range**3", "elevation", "elevation**2", "sin(2*azimuth)"):
-        found.append(Formula((f"{{a}} * {text}",), ("mm",), "point", True))
-    waves = ("sin(azimuth)", "cos(azimuth)", "sin(2*azimuth)", "cos(2*azimuth)", "elevation**2")
-    found += [_along(one, "mm") for one in waves]
-    return found
+    for name, low, high in varying:
+        centre, per = _centred(name, low, high), f"{unit} per unit of {name}"
+        found += [
+            Formula((text,), (per,), "actuator", shared)
+            for text in (f"{{a}} * {centre}", f"{{a}} * {centre} * s", f"{{a}} * {centre}**2")
+            for shared in (True, False)
+        ]
+    return [*found, *_of_time(fit, unit)]
+
+
+def _centred(name: str, low: float, high: float) -> str:
+    return f"({name} - {0.5 * (low + high):.6g})"
 
 
 def _along(shape: str, unit: str) -> Formula:
@@ -122,36 +151,41 @@ def _varying(fit: Fit) -> list[tuple[str, float, float]]:
     return found
 
 
-def _of_channel(centre: str, name: str, unit: str) -> list[Formula]:
-    per = f"{unit} per unit of {name}"
-    found = [
-        Formula((text,), (per,), "actuator", shared)
-        for text in (f"{{a}} * {centre}", f"{{a}} * {centre} * s", f"{{a}} * {centre}**2")
-        for shared in (True, False)
-    ]
-    return [*found, _along(centre, f"mm per unit of {name}")]
+WAVE = "{a} * sin(2*pi*t/p) + {b} * cos(2*pi*t/p)"
 
 
-def _of_time(fit: Fit, unit: str) -> list[Formula]:
-    """Waves and warming-up in time, where the run lasts long enough to see them."""
+def _span(fit: Fit) -> tuple[float, float] | None:
+    """How long the readings last and the shortest period in them, s; None for a few readings."""
     time = np.unique(fit.model.rows.time_s[fit.accepted])
     span = float(np.ptp(time))
     if time.size < 12 or span <= 0.0:
+        return None
+    return span, max(4.0 * span / time.size, span / (0.5 * PERIODS))
+
+
+def _of_time(fit: Fit, unit: str) -> list[Formula]:
+    """Waves and warming-up of actuators, where the run lasts long enough to see them."""
+    known = _span(fit)
+    if known is None:
         return []
-    low = max(4.0 * span / time.size, span / (0.5 * PERIODS))
-    period = ("p", "s", low, span)
-    wave = "{a} * sin(2*pi*t/p) + {b} * cos(2*pi*t/p)"
-    decay = ("tau", "s", span / 20.0, span)
-    found = [Formula((wave,), (unit, unit), "actuator", shared, period) for shared in (True, False)]
+    span, low = known
+    period, decay = ("p", "s", low, span), ("tau", "s", span / 20.0, span)
+    found = [Formula((WAVE,), (unit, unit), "actuator", shared, period) for shared in (True, False)]
     found += [
         Formula(("{a} * exp(-t/tau)",), (unit,), "actuator", shared, decay)
         for shared in (True, False)
     ]
-    for axis in range(3):
-        along = ["0", "0", "0"]
-        along[axis] = wave
-        found.append(Formula(tuple(along), ("mm", "mm"), "point", True, period))
     return found
+
+
+def _points_of_time(fit: Fit) -> list[Formula]:
+    """Waves of the point along each axis of the tracker frame."""
+    known = _span(fit)
+    if known is None:
+        return []
+    span, low = known
+    texts = [tuple(WAVE if axis == own else "0" for axis in range(3)) for own in range(3)]
+    return [Formula(text, ("mm", "mm"), "point", True, ("p", "s", low, span)) for text in texts]
 
 
 def propose(fit: Fit, rng: np.random.Generator) -> list[Proposal]:

@@ -9,7 +9,8 @@ have a definition of their own.
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown
+from calib.effects.component import Effect, Signature, Situation, Unknown, alone
+from calib.mechanism.axes import units_of
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import cross, rotate
 from calib.runs.stack import Rows
@@ -71,14 +72,30 @@ class GravitySag(Effect):
         return ""
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
-        """``gravity-sag.c``, mm/N or rad/(N mm)."""
-        if rows.machine.actuators[0].unit == "mm":
-            return (Unknown("gravity-sag.c", "mm/N", 1e-4),)
-        return (Unknown("gravity-sag.c", "rad/(N mm)", 1e-8),)
+        """``gravity-sag.c``, mm/N or rad/(N mm); ``.c_linear`` and ``.c_rotary`` where both are."""
+        axes = rows.machine.axes
+        units = units_of(axes)
+        first = [axes[own[0]] for own in units.values()]
+        return tuple(
+            Unknown(
+                "gravity-sag.c" if len(units) == 1 else f"gravity-sag.c_{axis.kind}",
+                axis.compliance_unit,
+                axis.compliance,
+            )
+            for axis in first
+        )
+
+    def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
+        """Linear or rotary actuators alone."""
+        return alone(len(units_of(rows.machine.axes)))
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """Actuator forces."""
-        return Signature(extension=actuator_forces(situation)[None])
+        forces, units = actuator_forces(situation), units_of(situation.machine.axes)
+        shape = np.zeros((len(units), *forces.shape))
+        for number, own in enumerate(units.values()):
+            shape[number, own] = forces[own]
+        return Signature(extension=shape)
 
 
 EFFECTS = (GravitySag(),)

@@ -167,7 +167,7 @@ def _speaking(
         channel=variable.name,
         acts_on=acts_on,
         axis=axis,
-        unit=carrier.unit,
+        unit=carrier.scale(axis)[0],
         p_value=_p(log_p),
         significant=_below(log_p, alpha),
         chi2_fall=float(whitened @ whitened),
@@ -190,7 +190,8 @@ def _binned(
     edges = _edges(values[seen])
     inside = np.array([seen & (values >= low) & (values <= high) for low, high in edges])
     shapes = column * inside
-    weight = shapes @ problem.project(shapes).T + np.eye(len(edges)) / (2.0 * carrier.size) ** 2
+    size = carrier.scale(axis)[1]
+    weight = shapes @ problem.project(shapes).T + np.eye(len(edges)) / (2.0 * size) ** 2
     covariance = np.linalg.inv(weight)
     centred = np.eye(len(edges)) - 1.0 / len(edges)
     estimate = centred @ covariance @ (shapes @ problem.residual)

@@ -31,13 +31,18 @@ class Carrier:
     """Directions in which readings can be moved.
 
     ``columns`` (c, R) whitened displacement of the readings per ``unit``; ``size`` in that unit
-    is how far things may reasonably be moved.
+    is how far things may reasonably be moved. Both are one for all directions, or one for each.
     """
 
     name: str
     columns: Array
-    unit: str = "mm"
-    size: float = 0.01
+    unit: str | tuple[str, ...] = "mm"
+    size: float | tuple[float, ...] = 0.01
+
+    def scale(self, axis: int) -> tuple[str, float]:
+        """Unit and size of one direction, counted from 0."""
+        unit = self.unit if isinstance(self.unit, str) else self.unit[axis]
+        return unit, self.size[axis] if isinstance(self.size, tuple) else self.size
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +100,7 @@ def _smooth(variable: Variable, carrier: Carrier) -> Candidate:
     if count > 1:
         subsets += [tuple(range(axis, count * order, count)) for axis in range(count)]
     unknowns = tuple(
-        Unknown(f"{variable.name}.{carrier.name}{axis + 1}.P{power}", carrier.unit, carrier.size)
+        Unknown(f"{variable.name}.{carrier.name}{axis + 1}.P{power}", *carrier.scale(axis))
         for power in range(1, order + 1)
         for axis in range(count)
     )
@@ -115,7 +120,7 @@ def _levels(variable: Variable, carrier: Carrier) -> Candidate:
     columns = (shapes * carrier.columns).reshape(1, -1, carrier.columns.shape[1])
     count = carrier.columns.shape[0]
     unknowns = tuple(
-        Unknown(f"{variable.name}.{carrier.name}{axis + 1}.{level:g}", carrier.unit, carrier.size)
+        Unknown(f"{variable.name}.{carrier.name}{axis + 1}.{level:g}", *carrier.scale(axis))
         for level in levels
         for axis in range(count)
     )
@@ -138,7 +143,7 @@ def _periodic(variable: Variable, carrier: Carrier) -> Candidate:
     columns *= np.concatenate([carrier.columns, carrier.columns])
     count = carrier.columns.shape[0]
     unknowns = tuple(
-        Unknown(f"{variable.name}.{carrier.name}{axis + 1}.{wave}", carrier.unit, carrier.size)
+        Unknown(f"{variable.name}.{carrier.name}{axis + 1}.{wave}", *carrier.scale(axis))
         for wave in ("sin", "cos")
         for axis in range(count)
     )

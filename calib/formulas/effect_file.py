@@ -13,6 +13,9 @@ that actuator), ``direction`` and ``step`` of its last move, the same of a parti
 (tracker frame, mm) there are ``x``, ``y``, ``z``, ``range``, ``azimuth``, ``elevation``, ``t`` and
 the channels; one formula acts along the line of sight, a list of three along x, y and z.
 
+``axes = ["leg1", "leg4"]`` leaves all other actuators alone: where linear and rotary ones are
+mixed, an unknown has a unit only among actuators of one unit.
+
 An unknown in which the formula is not linear is searched for and needs a range:
 ``tau = { unit = "s", from = 1, to = 100 }``; ``size`` (how large it may reasonably be) and
 ``sigma`` (a prior) may be given too.
@@ -65,7 +68,7 @@ def effect_from_text(text: str, source: str) -> OperatorEffect:
     expressions = read.expressions(acts_on)
     effect = OperatorEffect(
         read.identifier(), read.text("says", "an operator's own effect"), kind,
-        expressions, declared, read.flag("shared"), acts_on, source,
+        expressions, declared, read.flag("shared"), acts_on, source, read.axes(acts_on),
     )  # fmt: skip
     _check(effect, declared, read)
     return effect
@@ -98,7 +101,7 @@ class _Reader:
 
     def __init__(self, table: dict[str, Any], text: str, source: str) -> None:
         self.table, self.source, self.whole = table, source, text
-        known = {"id", "says", "acts_on", "expression", "unknowns", "shared", "kind"}
+        known = {"id", "says", "acts_on", "expression", "unknowns", "shared", "kind", "axes"}
         for key in table:
             if key not in known:
                 raise self.fault(key, f"unknown key {key!r}", f"Known: {', '.join(sorted(known))}")
@@ -129,6 +132,14 @@ class _Reader:
         if not isinstance(value, bool):
             raise self.fault(key, f"{key} is {value!r}", "Expected true or false")
         return value
+
+    def axes(self, acts_on: str) -> tuple[str, ...]:
+        value = self.table.get("axes", [])
+        if not isinstance(value, list) or not all(isinstance(one, str) for one in value):
+            raise self.fault("axes", f"axes is {value!r}", 'Write axes = ["leg1", "leg4"]')
+        if value and acts_on != "actuator":
+            raise self.fault("axes", "a point has no axes", "Leave axes out")
+        return tuple(dict.fromkeys(value))
 
     def expressions(self, acts_on: str) -> tuple[Expression, ...]:
         value = self.table.get("expression")

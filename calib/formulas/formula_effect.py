@@ -7,13 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from calib.arrays import Array
+from calib.arrays import Array, IntArray
 from calib.effects.component import Effect, Kind, Signature, Situation, Unknown
 from calib.effects.component import alone as alone_parts
 from calib.formulas.expression import (
     Expression,
     linear_unknowns,
 )
+from calib.mechanism.axes import units_of
 from calib.runs.stack import Rows
 
 USUAL_MM = 0.01
@@ -37,10 +38,11 @@ class OperatorEffect(Effect):
         shared: bool,
         acts_on: str,
         source: str,
+        axes: tuple[str, ...] = (),
     ) -> None:
         self.id, self.says, self.kind = identifier, says, kind
         self.expressions, self.shared, self.acts_on = expressions, shared, acts_on
-        self.source = source
+        self.source, self.only = source, axes
         names = tuple(one.name for one in declared)
         linear = {n for e in expressions for n in linear_unknowns(e, names)}
         for expression in expressions:
@@ -64,7 +66,10 @@ class OperatorEffect(Effect):
         """Say which column is missing, or where the formula has no value."""
         if reason := super().unavailable(rows):
             return reason
-        count = len(rows.machine.actuators)
+        own = {axis.name: axis for axis in rows.machine.axes}
+        if strange := [name for name in self.only if name not in own]:
+            return f"it is for {strange[0]}, and the machine has {', '.join(own)}"
+        count = len(own)
         for expression in self.expressions:
             for name in expression.names:
                 found = NUMBERED.fullmatch(name) if self._numbered(name) else None
@@ -84,11 +89,16 @@ class OperatorEffect(Effect):
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``id.limb.k`` for each actuator, or ``id.k``; then the searched ones, ``id.tau``."""
-        limbs = [""] if self._common else [f"{axis.name}." for axis in rows.machine.axes]
+        axes = [rows.machine.axes[index] for index in self._which(rows)]
+        prefixes = [""] if self._common else [f"{axis.name}." for axis in axes]
         sizes = self._sizes(rows)
         found = [
-            replace(one, name=f"{self.id}.{limb}{one.name}", size=_stated(one, sizes[one.name]))
-            for limb in limbs
+            replace(
+                one,
+                name=f"{self.id}.{prefix}{one.name}",
+                size=_stated(one, float(sizes[one.name][number])),
+            )
+            for number, prefix in enumerate(prefixes)
             for one in self.linear
         ]
         for one in self.searched:
@@ -101,25 +111,39 @@ class OperatorEffect(Effect):
     def _common(self) -> bool:
         return self.shared or self.acts_on == "point"
 
-    def _sizes(self, rows: Rows) -> dict[str, float]:
-        """Sizes that move the readings by ``USUAL_MM`` (actuators in rad: a hundredth of it)."""
-        usual = USUAL_MM
-        if self.acts_on == "actuator":
-            usual = rows.machine.axes[0].usual_error
+    def _which(self, rows: Rows) -> IntArray:
+        """Indices of the actuators that the formula is for."""
+        chosen = [not self.only or axis.name in self.only for axis in rows.machine.axes]
+        return np.flatnonzero(chosen)
+
+    def _sizes(self, rows: Rows) -> dict[str, Array]:
+        """Sizes that move the readings by what is usual: of each actuator, or one for all."""
         shapes = self._shapes(self._columns(rows, rows.position), next(self.trials(rows)))
+        usual = np.array([USUAL_MM])
+        groups: list[slice | IntArray] = [slice(None)]
+        if self.acts_on == "actuator":
+            which = self._which(rows)
+            axes = [rows.machine.axes[index] for index in which]
+            shapes = [shape[which] for shape in shapes]
+            usual = np.array([axis.usual_error for axis in axes])
+            if not self.shared:
+                groups = list(units_of(axes).values())
         sizes = {}
         for one, shape in zip(self.linear, shapes, strict=True):
-            seen = np.broadcast_to(shape, (shape.shape[0], rows.count))[:, rows.on_platform]
-            seen = seen[np.isfinite(seen)]
-            rms = float(np.sqrt(np.mean(seen**2))) if seen.size else 0.0
-            sizes[one.name] = usual / rms if rms > 0.0 else usual
+            seen = np.broadcast_to(shape / usual[:, None], shape.shape)[:, rows.on_platform]
+            sizes[one.name] = usual.copy()
+            for group in groups:
+                known = seen[group][np.isfinite(seen[group])]
+                rms = float(np.sqrt(np.mean(known**2))) if known.size else 0.0
+                if rms > 0.0:
+                    sizes[one.name][group] = 1.0 / rms
         return sizes
 
     def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
         """One actuator alone."""
         if self._common:
             return ()
-        return alone_parts(len(rows.machine.actuators), len(self.linear))
+        return alone_parts(self._which(rows).size, len(self.linear))
 
     def trials(self, rows: Rows) -> Iterator[tuple[float, ...]]:
         """Every combination of the searched unknowns' values."""
@@ -139,19 +163,20 @@ class OperatorEffect(Effect):
         linear = values[: values.size - count]
         if self.acts_on == "point":
             return Signature(point=self._point(situation, shapes, columns, trial, linear))
+        which = self._which(situation.rows)
         n, rows = len(situation.machine.actuators), situation.rows.count
         out = np.zeros((values.size, n, rows))
         for number, shape in enumerate(shapes):
             if self._common:
-                out[number] = shape
+                out[number, which] = shape[which]
             else:
-                for actuator in range(n):
-                    at = actuator * len(self.linear) + number
-                    out[at, actuator] = np.broadcast_to(shape, (n, rows))[actuator]
+                at = np.arange(which.size) * len(self.linear) + number
+                out[at, which] = shape[which]
+        amplitudes = np.zeros((len(self.linear), n, 1))
+        amplitudes[:, which, 0] = linear.reshape(-1, len(self.linear)).T
         for number, one in enumerate(self.searched):
-            amplitudes = linear.reshape(-1, len(self.linear))
-            slope = self._slope(columns, trial, one.name, amplitudes.T[:, :, None])
-            out[values.size - count + number] = slope[0]
+            slope = self._slope(columns, trial, one.name, amplitudes)[0]
+            out[values.size - count + number, which] = slope[which]
         return Signature(extension=out)
 
     def _point(

@@ -49,6 +49,11 @@ class Axis:
     compliance: float
 
     @property
+    def kind(self) -> str:
+        """Whether the actuator is linear (mm) or rotary (rad)."""
+        return "linear" if self.unit == "mm" else "rotary"
+
+    @property
     def compliance_unit(self) -> str:
         """Unit of a yield: mm/N or rad/(N mm)."""
         return "mm/N" if self.unit == "mm" else "rad/(N mm)"
