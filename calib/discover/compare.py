@@ -137,9 +137,7 @@ def _repeats(fit: Fit, which: BoolArray) -> PureError:
 
 def _displacement(fit: Fit, speaking: Speaking) -> float:
     """RMS in mm over readings of what a variable explains, less noise's share (dof of chi2)."""
-    factors = np.linalg.inv(np.moveaxis(fit.model.rows.whitener[:, :, fit.accepted], -1, 0))
-    whitened = speaking.fitted.reshape(3, -1)
-    moved = np.einsum("nij,jn->in", factors, whitened)
+    moved = fit.model.rows.in_mm(speaking.fitted.reshape(3, -1), fit.accepted)
     share = max(1.0 - speaking.dof / max(speaking.chi2_fall, 1e-9), 0.0)
     return float(np.sqrt(share * np.mean(np.sum(moved**2, axis=0))))
 

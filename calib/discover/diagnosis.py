@@ -6,7 +6,6 @@ from functools import cached_property
 
 import numpy as np
 
-from calib.arrays import Array, BoolArray
 from calib.discover.problem import effect_candidates, quadratics_of, variables_of
 from calib.effects.component import Effect
 from calib.evidence.diagnosis import diagnose
@@ -16,6 +15,7 @@ from calib.identify.fitting import Fit
 from calib.identify.holdout import HoldOut, hold_out, hold_out_of
 from calib.identify.signatures import EffectColumns, effect_columns
 from calib.model.columns import whitened_columns
+from calib.scaled import Scaled, normal_matrix
 from calib.unknown import Estimate, estimates_of, linear_among
 
 
@@ -60,45 +60,25 @@ class RunDiagnosis:
         signature = one.effect.signature(linear.situation, values)
         own = whitened_columns(signature, linear.situation) * one.known
         sigma = np.array([unknown.prior_sigma for unknown in one.unknowns])
-        larger = _Larger(
-            np.concatenate([linear.jacobian, own]),
-            np.concatenate([fitted.prior_precision, 1.0 / sigma**2]),
-            np.concatenate(
-                [fitted.prior_precision * fitted.model.deviation(linear.state), 0.0 * sigma]
-            ),
+        jacobian = np.concatenate([linear.jacobian, own])
+        precision = np.concatenate([fitted.prior_precision, 1.0 / sigma**2])
+        pull = np.concatenate(
+            [fitted.prior_precision * fitted.model.deviation(linear.state), 0.0 * sigma]
         )
         accepted = fitted.accepted & one.known
-        step, spread = larger.solved(linear.whitened, accepted)
-        left = linear.whitened - np.tensordot(step, larger.jacobian, axes=1)
-        factors = np.linalg.inv(np.moveaxis(rows.whitener, -1, 0))[accepted]
-        natural = np.einsum("nij,jn->in", factors, left[:, accepted])
-        held = hold_out_of(
-            rows, accepted, linear.whitened, larger.jacobian, larger.precision, larger.pull
-        )
+        chosen = jacobian[:, :, accepted].reshape(precision.size, -1)
+        covariance = Scaled.of(normal_matrix(chosen, precision)).inverse()
+        step = covariance @ (chosen @ linear.whitened[:, accepted].reshape(-1) - pull)
+        spread = np.sqrt(np.diag(covariance))
+        left = linear.whitened - np.tensordot(step, jacobian, axes=1)
+        natural = rows.in_mm(left[:, accepted], accepted)
+        held = hold_out_of(rows, accepted, linear.whitened, jacobian, precision, pull)
         values = np.where(linear_among(one.unknowns), step[-sigma.size :], values)
         return Outlook(
             rms_mm=float(np.sqrt(np.mean(np.sum(natural**2, axis=0)))),
             holdout=held,
             estimates=estimates_of(one.unknowns, values, spread[-sigma.size :]),
         )
-
-
-@dataclass(frozen=True, eq=False)
-class _Larger:
-    """The linearised model with the columns of one more effect."""
-
-    jacobian: Array
-    precision: Array
-    pull: Array
-
-    def solved(self, whitened: Array, accepted: BoolArray) -> tuple[Array, Array]:
-        """Step (p,) to the optimum, and standard uncertainties (p,)."""
-        chosen = self.jacobian[:, :, accepted].reshape(self.precision.size, -1)
-        normal = chosen @ chosen.T + np.diag(self.precision)
-        scale = 1.0 / np.sqrt(np.diag(normal))
-        covariance = np.linalg.inv(normal * scale[:, None] * scale) * scale[:, None] * scale
-        slope = chosen @ whitened[:, accepted].reshape(-1) - self.pull
-        return covariance @ slope, np.sqrt(np.diag(covariance))
 
 
 def diagnose_fit(

@@ -217,8 +217,7 @@ def _poses(fit: Fit) -> IntArray:
 
 
 def _proposal(fit: Fit, formula: Formula, number: int, found: Selected) -> Proposal:
-    factors = np.linalg.inv(np.moveaxis(fit.model.rows.whitener[:, :, fit.accepted], -1, 0))
-    moved = np.einsum("nij,jn->in", factors, found.fitted.reshape(3, -1))
+    moved = fit.model.rows.in_mm(found.fitted.reshape(3, -1), fit.accepted)
     said = ", ".join(one.format(a="a", b="b", c="c") for one in formula.text)
     says = f"proposed from the residual: {said}"
     if found.trial:

@@ -19,9 +19,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg
 
 from calib.arrays import Array
+from calib.scaled import Scaled, normal_matrix
 
 
 class Separation:
@@ -38,33 +38,24 @@ class Separation:
     """
 
     def __init__(self, nuisance: Array, precision: Array, signature: Array) -> None:
-        normal = nuisance @ nuisance.T
-        normal[np.diag_indices_from(normal)] += precision
-        size = np.sqrt(np.diag(normal))
-        self._scale = 1.0 / np.where(size > 0.0, size, 1.0)
-        normal = normal * self._scale[:, None] * self._scale
-        normal[np.diag_indices_from(normal)] += 1e-10
-        factor = linalg.cho_factor(normal, lower=True)
-        self._P: Array = linalg.cho_solve(factor, np.eye(size.size))
-        self._x: Array = self._P @ (self._scale * (nuisance @ signature))
-        explained = float((self._scale * (nuisance @ signature)) @ self._x)
-        self.delta = max(float(signature @ signature) - explained, 0.0)
+        self._P = Scaled.of(normal_matrix(nuisance, precision), least=1e-10).inverse()
+        slope = nuisance @ signature
+        self._x: Array = self._P @ slope
+        self.delta = max(float(signature @ signature) - float(slope @ self._x), 0.0)
 
     def gains(self, nuisance: Array, signature: Array) -> Array:
         """Rise of ``delta`` (C,) by each of C blocks: nuisance (C, n, m), signature (C, m)."""
-        scaled = nuisance * self._scale[:, None]
-        left = signature - np.einsum("cnm,n->cm", scaled, self._x)
-        spread = np.swapaxes(scaled, 1, 2) @ (self._P @ scaled)
+        left = signature - np.einsum("cnm,n->cm", nuisance, self._x)
+        spread = np.swapaxes(nuisance, 1, 2) @ (self._P @ nuisance)
         spread += np.eye(spread.shape[-1])
         return np.asarray(np.einsum("cm,cm->c", left, _solve(spread, left)))
 
     def add(self, nuisance: Array, signature: Array) -> None:
         """Measure one block: nuisance (n, m), signature (m,)."""
         self.delta += float(self.gains(nuisance[None], signature[None])[0])
-        scaled = nuisance * self._scale[:, None]
-        reach = self._P @ scaled
-        left = signature - scaled.T @ self._x
-        inverse = np.linalg.inv(np.eye(left.size) + scaled.T @ reach)
+        reach = self._P @ nuisance
+        left = signature - nuisance.T @ self._x
+        inverse = np.linalg.inv(np.eye(left.size) + nuisance.T @ reach)
         self._x = self._x + reach @ (inverse @ left)
         self._P = self._P - reach @ inverse @ reach.T
 

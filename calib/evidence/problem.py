@@ -22,6 +22,7 @@ import numpy as np
 from scipy import linalg
 
 from calib.arrays import Array
+from calib.scaled import Scaled, normal_matrix
 
 VANISHING = 1e-10
 """Eigenvalues of the scaled J J^T below this times the largest are directions not seen at all."""
@@ -59,29 +60,19 @@ class LinearProblem:
         return self.residual.size
 
     @cached_property
-    def _factor(self) -> tuple[Array, Array]:
-        """Lower Cholesky factor of N scaled to a unit diagonal, and the scale (p,)."""
-        normal = self.jacobian @ self.jacobian.T
-        normal[np.diag_indices_from(normal)] += self.prior_precision
-        diagonal = np.diag(normal)
-        scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-        scaled = normal * scale[:, None] * scale
-        # 1e-12 keeps unknowns that neither data nor prior determine from stopping the diagnosis
-        scaled[np.diag_indices_from(scaled)] += 1e-12
-        return linalg.cholesky(scaled, lower=True), scale
+    def _normal(self) -> Scaled:
+        """N, scaled to a unit diagonal."""
+        # Unknowns that neither data nor prior determine must not stop the diagnosis.
+        return Scaled.of(normal_matrix(self.jacobian, self.prior_precision), least=1e-12)
 
     @cached_property
     def absorbed(self) -> Array:
         """G (p, R): M = I - G^T G."""
-        factor, scale = self._factor
-        return np.asarray(
-            linalg.solve_triangular(factor, scale[:, None] * self.jacobian, lower=True)
-        )
+        return self._normal.half_solved(self.jacobian)
 
     def whitened_step(self, slope: Array) -> Array:
         """L^-1 slope (p,): a step of the fitted unknowns moves the prediction by G^T times it."""
-        factor, scale = self._factor
-        return np.asarray(linalg.solve_triangular(factor, scale * slope, lower=True))
+        return self._normal.half_solved(slope)
 
     @cached_property
     def trace(self) -> float:
@@ -120,14 +111,11 @@ class LinearProblem:
         By perturbation: e = eps - J^T N^-1 (J eps + Lambda^1/2 xi), whose covariance is
         I - 2 J^T N^-1 J + J^T N^-1 N N^-1 J = M.
         """
-        factor, scale = self._factor
         noise = rng.standard_normal((self.rows, draws))
         prior = np.sqrt(self.prior_precision)[:, None] * rng.standard_normal(
             (self.prior_precision.size, draws)
         )
-        pulled = self.absorbed @ noise + linalg.solve_triangular(
-            factor, scale[:, None] * prior, lower=True
-        )
+        pulled = self.absorbed @ noise + self._normal.half_solved(prior)
         return np.asarray(noise - self.absorbed.T @ pulled)
 
     def with_columns(self, columns: Array, precision: Array) -> "LinearProblem":

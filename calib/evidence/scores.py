@@ -16,13 +16,13 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg
 
 from calib.arrays import Array
 from calib.evidence.candidate import Candidate
 from calib.evidence.problem import LinearProblem
 from calib.evidence.tails import log_any, log_tail, looks
 from calib.evidence.weighing import Stack, Weighing, soft_test, stacked
+from calib.scaled import Scaled
 
 EVEN = 0.9
 """A group that is seen so evenly needs no test in which its directions weigh differently."""
@@ -169,15 +169,13 @@ class Scores:
         """
         projected = self.problem.project(columns)
         weight = columns @ projected.T + np.diag(precision)
-        scale = 1.0 / np.sqrt(np.diag(weight))
-        factor = linalg.cholesky(weight * scale[:, None] * scale, lower=True)
-        half = linalg.solve_triangular(factor, np.diag(scale), lower=True)
-        taken = half @ projected
+        scaled = Scaled.of(weight)
+        taken = scaled.half_solved(projected)
         prior = np.sqrt(precision)[:, None] * rng.standard_normal(
             (precision.size, self.residuals.shape[1])
         )
         prior[:, 0] = 0.0
-        pulled = half @ (columns @ self.residuals + prior)
+        pulled = scaled.half_solved(columns @ self.residuals + prior)
         scores, weights = [], []
         for index, old in enumerate(self.scores):
             cross = self.of_units(index, taken.T)

@@ -121,8 +121,7 @@ class Fit:
 
     def explained(self, covariance: Array, which: BoolArray) -> float:
         """Sum of tr(J C J^T) in mm^2 over readings: variance of the prediction itself."""
-        factors = np.linalg.inv(np.moveaxis(self.model.rows.whitener[:, :, which], -1, 0))
-        jacobian = np.einsum("nij,pjn->pin", factors, self.linear.jacobian[:, :, which])
+        jacobian = self.model.rows.in_mm(self.linear.jacobian[:, :, which], which)
         flat = jacobian.reshape(jacobian.shape[0], -1)
         return float(np.sum(flat * (covariance @ flat)))
 

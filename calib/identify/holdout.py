@@ -8,11 +8,11 @@ neglects is of second order in a step of the size of the parameters' uncertainty
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg
 
 from calib.arrays import Array, BoolArray
 from calib.identify.fitting import Fit
 from calib.runs.stack import Rows
+from calib.scaled import Scaled, normal_matrix
 
 
 @dataclass(frozen=True)
@@ -55,10 +55,8 @@ def hold_out_of(
         1 / sigma^2 of the priors, and that times the distance from their means.
     """
     chosen = jacobian[:, :, accepted].reshape(jacobian.shape[0], -1)
-    normal = chosen @ chosen.T + np.diag(precision)
+    normal = normal_matrix(chosen, precision)
     slope = chosen @ whitened[:, accepted].reshape(-1) - pull
-    scale = 1.0 / np.sqrt(np.diag(normal))
-    factors = np.linalg.inv(np.moveaxis(rows.whitener, -1, 0))
     squares, floor, count = 0.0, 0.0, 0
     for fold in np.unique(rows.fold[rows.fold >= 0]):
         held = (rows.fold == fold) & accepted
@@ -66,20 +64,14 @@ def hold_out_of(
             continue
         own = jacobian[:, :, held]
         block = own.reshape(own.shape[0], -1)
-        inverse = _inverse(normal - block @ block.T, scale)
+        inverse = Scaled.of(normal - block @ block.T).inverse()
         step = inverse @ (slope - block @ whitened[:, held].reshape(-1))
         off = whitened[:, held] - np.tensordot(step, own, axes=1)
-        squares += float(np.sum(np.einsum("nij,jn->in", factors[held], off) ** 2))
+        squares += float(np.sum(rows.in_mm(off, held) ** 2))
         floor += float(np.einsum("iin->", rows.covariance[:, :, held]))
-        natural = np.einsum("nij,pjn->pin", factors[held], own).reshape(own.shape[0], -1)
+        natural = rows.in_mm(own, held).reshape(own.shape[0], -1)
         floor += float(np.sum(natural * (inverse @ natural)))
         count += int(held.sum())
     if count == 0:
         return HoldOut(float("nan"), float("nan"), 0)
     return HoldOut(float(np.sqrt(squares / count)), float(np.sqrt(floor / count)), count)
-
-
-def _inverse(normal: Array, scale: Array) -> Array:
-    factor = linalg.cho_factor(normal * scale[:, None] * scale, lower=True)
-    inverse: Array = linalg.cho_solve(factor, np.eye(scale.size))
-    return inverse * scale[:, None] * scale

@@ -10,11 +10,11 @@ and the frames, which have none, are seen by every reading.
 """
 
 import numpy as np
-from scipy import linalg
 
 from calib.arrays import Array, BoolArray
 from calib.errors import BadInput
 from calib.model.prediction import Linearised, Model
+from calib.scaled import Scaled, normal_matrix
 
 MAX_STEPS = 30
 LEAST_FALL = 1e-3
@@ -39,14 +39,12 @@ def optimise(
     cost = _cost(model, linear, accepted, precision)
     damping, stalled = 0.0, 0
     for taken in range(1, MAX_STEPS + 1):
-        normal, slope, scale = _normal_equations(model, linear, accepted, precision)
+        normal, slope = _normal_equations(model, linear, accepted, precision)
         while True:
-            factor = linalg.cho_factor(normal + damping * np.eye(scale.size), lower=True)
-            step = scale * linalg.cho_solve(factor, slope)
-            fall = float(step @ (slope / scale))
+            step = normal.solve(slope, damping)
+            fall = float(step @ slope)
             if fall <= max(TOLERANCE, 1e-9 * cost) or stalled == 2:
-                covariance = _inverse(normal) * scale[:, None] * scale
-                return linear, covariance, taken - 1
+                return linear, normal.inverse(), taken - 1
             trial = _attempt(model, linear, step)
             if trial is not None:
                 reached = _cost(model, trial, accepted, precision)
@@ -109,20 +107,12 @@ def _cost(model: Model, linear: Linearised, accepted: BoolArray, precision: Arra
 
 def _normal_equations(
     model: Model, linear: Linearised, accepted: BoolArray, precision: Array
-) -> tuple[Array, Array, Array]:
-    """Normal matrix scaled to a unit diagonal, scaled slope, and the scale (p,)."""
+) -> tuple[Scaled, Array]:
+    """Normal matrix and slope (p,)."""
     jacobian = linear.jacobian
     if not accepted.all():
         jacobian = jacobian[:, :, accepted]
     flat = jacobian.reshape(jacobian.shape[0], -1)
-    normal = flat @ flat.T
-    normal[np.diag_indices_from(normal)] += precision
     slope = flat @ linear.whitened[:, accepted].reshape(-1)
     slope -= precision * model.deviation(linear.state)
-    scale = 1.0 / np.sqrt(np.diag(normal))
-    return normal * scale[:, None] * scale, slope * scale, scale
-
-
-def _inverse(matrix: Array) -> Array:
-    factor = linalg.cho_factor(matrix, lower=True)
-    return np.asarray(linalg.cho_solve(factor, np.eye(matrix.shape[0])))
+    return Scaled.of(normal_matrix(flat, precision)), slope

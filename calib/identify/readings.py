@@ -14,6 +14,7 @@ from scipy import stats
 
 from calib.arrays import Array, BoolArray
 from calib.runs.stack import Rows
+from calib.scaled import Scaled, normal_matrix
 
 FALSE_ALARM = 1e-3
 """Probability that a run without a stray has a reading flagged."""
@@ -76,8 +77,7 @@ def strays(
     """
     accepted = candidates.copy()
     flat = np.where(accepted, jacobian, 0.0)
-    normal = flat.reshape(flat.shape[0], -1) @ flat.reshape(flat.shape[0], -1).T
-    normal += np.diag(prior_precision)
+    normal = normal_matrix(flat.reshape(flat.shape[0], -1), prior_precision)
     step = np.zeros(flat.shape[0])
     found: list[int] = []
     while len(found) < MOST_STRAYS * candidates.sum():
@@ -96,8 +96,7 @@ def _worst(
     whitened: Array, jacobian: Array, normal: Array, step: Array, accepted: BoolArray
 ) -> tuple[int | None, Array]:
     """Most suspicious reading, or None; and the step of the fit once it is left out."""
-    scale = 1.0 / np.sqrt(np.diag(normal))
-    inverse = np.linalg.inv(normal * scale[:, None] * scale) * scale[:, None] * scale
+    inverse = Scaled.of(normal).inverse()
     count = accepted.size
     flat = jacobian.reshape(jacobian.shape[0], -1)
     spread = (inverse @ flat).reshape(jacobian.shape)

@@ -150,8 +150,7 @@ def _slack(model: Model, linear: Linearised) -> Array:
     for effects that nobody has modelled.
     """
     count = model.free.size
-    factors = np.linalg.inv(np.moveaxis(model.rows.whitener, -1, 0))
-    moved = np.einsum("nij,pjn->pin", factors, linear.jacobian[:count])
+    moved = model.rows.in_mm(linear.jacobian[:count])
     moved *= model.machine.prior_sigma[model.free][:, None, None]
     spread = np.sqrt(np.sum(moved**2, axis=(0, 1)))
     noise = np.sqrt(np.einsum("iin->n", model.rows.covariance))

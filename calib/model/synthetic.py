@@ -22,9 +22,7 @@ def synthetic_rows(model: Model, state: State, generator: np.random.Generator | 
 
 def noise(rows: Rows, generator: np.random.Generator) -> Array:
     """Errors (3, N) in mm drawn from the readings' covariances."""
-    factors = np.linalg.cholesky(np.moveaxis(rows.covariance, -1, 0))
-    drawn = generator.standard_normal((rows.count, 3))
-    return np.asarray(np.einsum("nij,nj->in", factors, drawn))
+    return rows.in_mm(generator.standard_normal((rows.count, 3)).T)
 
 
 def drawn_from_prior(model: Model, state: State, generator: np.random.Generator) -> State:

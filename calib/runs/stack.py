@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from calib.arrays import Array, BoolArray, IntArray
+from calib.arrays import Array, BoolArray, IntArray, Selection
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.runs.record import Run, approach, holdout_folds
@@ -64,10 +64,21 @@ class Rows:
         return self.run.size
 
     @cached_property
-    def whitener(self) -> Array:
-        """Inverse Cholesky factors (3, 3, N): whitened residual = whitener @ residual."""
+    def unwhitener(self) -> Array:
+        """Cholesky factors (3, 3, N) of the covariance, mm: residual = unwhitener @ whitened."""
         factors = np.linalg.cholesky(np.moveaxis(self.covariance, -1, 0))
-        return np.moveaxis(np.linalg.inv(factors), 0, -1)
+        return np.asarray(np.moveaxis(factors, 0, -1), dtype=np.float64, order="C")
+
+    @cached_property
+    def whitener(self) -> Array:
+        """Inverses (3, 3, N) of ``unwhitener``: whitened residual = whitener @ residual."""
+        inverse = np.linalg.inv(np.moveaxis(self.unwhitener, -1, 0))
+        return np.asarray(np.moveaxis(inverse, 0, -1), dtype=np.float64)
+
+    def in_mm(self, whitened: Array, which: Selection = slice(None)) -> Array:
+        """Displacements (..., 3, M) in sigmas of the readings ``which``, in mm."""
+        factors = self.unwhitener[:, :, which]
+        return np.asarray(np.einsum("ijn,...jn->...in", factors, whitened))
 
     def column(self, name: str) -> Array:
         """State columns (k, N) by name: q, direction, step, time_s, progress or a channel."""

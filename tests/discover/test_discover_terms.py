@@ -88,7 +88,7 @@ def quadratic():
     moved = np.zeros((6, rows.count))
     moved[[1, 4]] = 2e-5 * rows.extension[[1, 4]] ** 2
     whitened = np.einsum("ujn,un->jn", clean.linear.situation.actuator_columns, moved)
-    shift = np.einsum("nij,jn->in", np.linalg.inv(np.moveaxis(rows.whitener, -1, 0)), whitened)
+    shift = rows.in_mm(whitened)
     return fit(Model(dataclasses.replace(rows, position=rows.position + shift)))
 
 

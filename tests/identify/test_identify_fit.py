@@ -86,6 +86,19 @@ def test_identify_jacobian_with_every_effect_against_central_differences(example
         np.testing.assert_allclose(own, slope, atol=2e-3 * np.abs(own).max() + 1e-9, err_msg=name)
 
 
+def test_identify_whitening_and_back(example):
+    rows = example("no-effect")
+    unit = np.einsum("ijn,jkn,lkn->iln", rows.whitener, rows.covariance, rows.whitener)
+    np.testing.assert_allclose(unit, np.eye(3)[:, :, None] * np.ones(rows.count), atol=1e-9)
+    whitened = np.random.default_rng(3).standard_normal((2, 3, rows.count))
+    some = rows.on_platform
+    back = np.einsum("ijn,ujn->uin", rows.whitener[:, :, some], rows.in_mm(whitened)[..., some])
+    np.testing.assert_allclose(back, whitened[..., some], atol=1e-9)
+    np.testing.assert_allclose(
+        rows.in_mm(whitened[..., some], some), rows.in_mm(whitened)[..., some]
+    )
+
+
 def test_identify_predicted_uncertainty_is_true(example):
     """A slice of bench/coverage.py: pooled over parameters, 60 trials."""
     model = Model(example("no-effect"))
