@@ -1,7 +1,8 @@
-"""Numbers with units, as people write them in machine files: ``15 deg``, ``0.3 mm``."""
+"""Numbers with units, as people write them in machine files: ``15 deg``, ``5 mm/turn``."""
 
 import math
 import re
+from collections.abc import Iterable
 
 from calib.errors import BadInput
 
@@ -13,11 +14,18 @@ UNITS = {
     "mrad": ("rad", 1e-3),
     "deg": ("rad", math.pi / 180.0),
     "d": ("rad", math.pi / 180.0),
+    "turn": ("rad", 2.0 * math.pi),
 }
 """Unit -> (base unit, factor)."""
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_QUANTITY = re.compile(rf"({_NUMBER})\s*([A-Za-z]*)")
+_QUANTITY = re.compile(rf"({_NUMBER})\s*(?:([A-Za-z]+)(?:\s*/\s*({_NUMBER})?\s*([A-Za-z]+))?)?")
+
+
+def is_quantity(text: str) -> bool:
+    """Whether a text begins like a number and any unit of it is known; a name may too: ``0dx1``."""
+    found = _QUANTITY.fullmatch(text)
+    return found is not None and all(u is None or u in UNITS for u in found.group(2, 4))
 
 
 def quantity(value: object, unit: str, place: str) -> float:
@@ -28,34 +36,68 @@ def quantity(value: object, unit: str, place: str) -> float:
     BadInput
         If it is not a finite number, or its unit is unknown or measures something else.
     """
+    number, own = measured(value, place, unit or "mm")
+    if unit and own not in ("", unit):
+        raise BadInput(
+            f"{value!r} does not measure what is asked for here",
+            place=place,
+            remedy=f"A value in {unit} is expected.",
+        )
+    return number
+
+
+def measured(value: object, place: str, like: str = "mm") -> tuple[float, str]:
+    """A number and its unit: "mm", "rad", "mm/rad", "rad/mm"; "" for a bare number.
+
+    Raises
+    ------
+    BadInput
+        If it is not a finite number, or its unit is unknown; ``like`` is the unit of the example.
+    """
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise BadInput(
-            f"{value!r} is not a number",
-            place=place,
-            remedy=f'Write 12.5 or "12.5 {unit or "mm"}".',
+            f"{value!r} is not a number", place=place, remedy=f'Write 12.5 or "12.5 {like}".'
         )
-    factor = 1.0
-    if isinstance(value, str):
-        found = _QUANTITY.fullmatch(value.strip())
-        if not found:
-            raise BadInput(
-                f"{value!r} is not a number with a unit", place=place, remedy='Write "15 deg".'
-            )
-        number = float(found.group(1))
-        if name := found.group(2):
-            if name not in UNITS:
-                raise BadInput(
-                    f'unknown unit "{name}"', place=place, remedy=f"Known are {', '.join(UNITS)}."
-                )
-            base, factor = UNITS[name]
-            if unit and base != unit:
-                raise BadInput(
-                    f'"{name}" does not measure what is asked for here',
-                    place=place,
-                    remedy=f"A value in {unit} is expected.",
-                )
-    else:
-        number = float(value)
+    number, unit = (float(value), "") if not isinstance(value, str) else _parsed(value, place)
     if not math.isfinite(number):
         raise BadInput(f"{value!r} is not finite", place=place, remedy="Give a finite number.")
-    return number * factor
+    return number, unit
+
+
+def _parsed(text: str, place: str) -> tuple[float, str]:
+    found = _QUANTITY.fullmatch(text.strip())
+    if not found:
+        raise BadInput(
+            f"{text!r} is not a number with a unit", place=place, remedy='Write "15 deg".'
+        )
+    number, units = float(found.group(1)), []
+    if found.group(2):
+        base, factor = _unit(found.group(2), place)
+        number, units = number * factor, [base]
+    if found.group(4):
+        base, factor = _unit(found.group(4), place)
+        below = factor * float(found.group(3) or 1.0)
+        number = number / below if below else math.inf
+        units.append(f"1/{base}")
+    return number, product_unit(units)
+
+
+def _unit(name: str, place: str) -> tuple[str, float]:
+    if name not in UNITS:
+        raise BadInput(
+            f'unknown unit "{name}"', place=place, remedy=f"Known are {', '.join(UNITS)}."
+        )
+    return UNITS[name]
+
+
+def product_unit(units: Iterable[str]) -> str:
+    """Unit of a product: of ``mm/rad`` and ``rad`` it is ``mm``, "" where all cancels."""
+    powers = {"mm": 0, "rad": 0}
+    for unit in units:
+        above, _, below = unit.partition("/")
+        for name, sign in ((above, 1), (below, -1)):
+            if name in powers:
+                powers[name] += sign
+    above = "*".join(name for name, power in powers.items() for _ in range(power))
+    below = "*".join(name for name, power in powers.items() for _ in range(-power))
+    return f"{above or 1}/{below}" if below else above

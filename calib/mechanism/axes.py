@@ -26,6 +26,9 @@ class Axis:
         Unique in the machine: that of the limb, where the actuator drives this limb alone and
         nothing else drives it; else the actuator's own.
     unit : "mm" or "rad"
+    moves, ratio : "mm" or "rad", float
+        Unit of the joint that it drives, and how far the joint goes per ``unit`` of the actuator:
+        1 but behind a screw or a gear.
     usual_error : float
         How large an error along the axis may reasonably be.
     lost_motion : float
@@ -41,6 +44,8 @@ class Axis:
 
     name: str
     unit: str
+    moves: str
+    ratio: float
     usual_error: float
     lost_motion: float
     motion: float
@@ -81,8 +86,16 @@ _USUAL: Mapping[str, _Usual] = {
 def axes_of(actuators: "Sequence[Actuator]", limbs: "Sequence[Limb]") -> tuple[Axis, ...]:
     """One axis for each actuator, in order."""
     names = _names(actuators, limbs)
+    joints: list[list[tuple[str, float]]] = [[] for _ in actuators]
+    for limb in limbs:
+        for element in limb.elements:
+            for term in element.terms:
+                if term.kind == "actuator" and term.factor:
+                    unit = "rad" if element.turns else "mm"
+                    joints[term.index].append((unit, abs(term.factor)))
     return tuple(
-        _axis(name, actuator.unit) for name, actuator in zip(names, actuators, strict=True)
+        _axis(name, actuator.unit, own or [(actuator.unit, 1.0)])
+        for name, actuator, own in zip(names, actuators, joints, strict=True)
     )
 
 
@@ -95,17 +108,25 @@ def units_of(axes: Sequence[Axis]) -> dict[str, IntArray]:
     }
 
 
-def _axis(name: str, unit: str) -> Axis:
-    usual = _USUAL[unit]
+def _axis(name: str, unit: str, joints: list[tuple[str, float]]) -> Axis:
+    """What is usual at the joint, brought to the actuator; of several joints the most touchy."""
+    moves, ratio = min(joints, key=lambda joint: _USUAL[joint[0]].error / joint[1])
+    usual = _USUAL[moves]
+    shortest, longest = usual.shortest / ratio, usual.longest / ratio
+    if unit == "rad":
+        # Whatever is behind it, the motor itself turns.
+        shortest, longest = min(shortest, _TURN), max(longest, _TURN)
     return Axis(
         name=name,
         unit=unit,
-        usual_error=usual.error,
-        lost_motion=usual.lost_motion,
-        motion=usual.motion,
-        shortest=usual.shortest,
-        longest=usual.longest,
-        compliance=usual.compliance,
+        moves=moves,
+        ratio=ratio,
+        usual_error=usual.error / ratio,
+        lost_motion=usual.lost_motion / ratio,
+        motion=_USUAL[unit].motion,
+        shortest=shortest,
+        longest=longest,
+        compliance=usual.compliance / ratio**2,
     )
 
 

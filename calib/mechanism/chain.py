@@ -7,23 +7,20 @@ a local axis::
     Rx  Tz                   passive joints; Rx(90d) starts from 90 deg when the machine is closed
     psi=Rx(90d)              the same with a name, for its limits and for drawings
     Ty:q+L0                  a joint that the actuator q drives; L0 is a parameter
+    Ty:5mm/turn*q            the same by a motor that turns, behind a screw
     Uxz  Sxyz  Cz            universal, spherical and cylindrical joints, spelled out in order
     Rz:?a ... Rz:-?a         two joints that share one passive coordinate (a parallelogram)
     ctx:0.001  crz:1e-8      compliance at this place, mm/N or rad/(N mm)
 
-A value is a sum of terms ``[number*]name`` or numbers with a unit: ``-2*e+15d``.
+A value is a sum of products: ``-2*e+15d`` (``calib.mechanism.chain_value``).
 """
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from calib.errors import BadInput
+from calib.mechanism.chain_value import Meant, Resolve, read_value
 from calib.mechanism.description import Element, PassiveJoint, Term
-from calib.quantity import quantity
-
-Resolve = Callable[[str, str, str], Term | float]
-"""(name, unit, place) -> the variable that the name stands for, or the constant's value."""
 
 _TOKEN = re.compile(
     r"(?:(?P<name>[A-Za-z]\w*)=)?"
@@ -32,10 +29,6 @@ _TOKEN = re.compile(
     r"(?::(?P<value>\S+))?"
 )
 _AXISLESS = re.compile(r"(?:[A-Za-z]\w*=)?[RTUSC](?:\(.*)?(?::.*)?")
-_TERM = re.compile(
-    r"([+-]?)(?:(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)\*)?([^+\-*]+(?:(?<=\d[eE])[+-]\d+[A-Za-z]*)?)"
-)
-_NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?:mm|um|m|rad|mrad|deg|d)?")
 _EXPECTED_AXES = {"U": 2, "S": 3}
 
 
@@ -139,34 +132,16 @@ class ChainReader:
     def _value(
         self, text: str, unit: str, token: str, *, joint: bool, turns: bool
     ) -> tuple[float, list[Term]]:
-        constant, terms, end = 0.0, [], 0
-        for found in _TERM.finditer(text):
-            if found.start() != end or (end and not found[1]):
-                break
-            end = found.end()
-            sign = -1.0 if found[1] == "-" else 1.0
-            factor, name = sign * float(found[2] or 1.0), found[3]
-            if _NUMBER.fullmatch(name):
-                constant += factor * quantity(name, unit, f'{self.place}, "{token}"')
-            elif name.startswith("?") and joint:
-                terms.append(self._shared(name[1:], factor, turns))
-            else:
-                meant = self.resolve(name, unit, f'{self.place}, "{token}"')
-                if isinstance(meant, Term):
-                    terms.append(Term(meant.kind, meant.index, factor * meant.factor))
-                else:
-                    constant += factor * meant
-        if end != len(text):
-            raise BadInput(
-                f'cannot read the value "{text}" of "{token}"',
-                place=self.place,
-                remedy="A value is a sum of terms: q+L0, -P_x, 2*e, 15d.",
-            )
-        return constant, terms
+        def meant(name: str, place: str) -> Meant:
+            if name.startswith("?") and joint:
+                return Meant(self._shared(name[1:], turns), "rad" if turns else "mm")
+            return self.resolve(name, place)
 
-    def _shared(self, name: str, factor: float, turns: bool) -> Term:
+        return read_value(text, unit, f'{self.place}, "{token}"', meant)
+
+    def _shared(self, name: str, turns: bool) -> Term:
         if name not in self.shared:
             self.shared[name] = self.first_joint + len(self.joints)
             limits = self.limits.pop(name, (-float("inf"), float("inf")))
             self.joints.append(PassiveJoint(name, 0.0, limits, turns))
-        return Term("passive", self.shared[name], factor)
+        return Term("passive", self.shared[name], 1.0)

@@ -9,9 +9,10 @@ import numpy as np
 
 from calib.errors import BadInput
 from calib.mechanism.chain import ChainReader
+from calib.mechanism.chain_value import Meant
 from calib.mechanism.description import Actuator, Limb, Parameter, Term
 from calib.mechanism.tables import TableReader
-from calib.quantity import quantity
+from calib.quantity import measured
 
 _TYPE_KEYS = ("chain", "chains", "parameters", "joints", "says")
 _PARAMETER_KEYS = ("unit", "tolerance", "sigma", "nominal", "says", "hidden")
@@ -95,9 +96,7 @@ class LimbReader(TableReader):
         limbs, unknown = [], dict(limits)
         for chain in chains:
             reader = ChainReader(
-                lambda symbol, unit, place: self._resolve(
-                    name, spec, declared, used, symbol, unit, place
-                ),
+                lambda symbol, place: self._resolve(name, spec, declared, used, symbol, place),
                 f"{chain_place}, limb {name}",
                 self.joints,
                 dict(limits),
@@ -155,13 +154,12 @@ class LimbReader(TableReader):
         declared: Mapping[str, Any],
         used: set[str],
         symbol: str,
-        unit: str,
         place: str,
-    ) -> Term | float:
+    ) -> Meant:
         names = [a.name for a in self.actuators]
         used.add(symbol)
         if symbol in declared:
-            return self._parameter_term(f"{limb}.{symbol}", unit, place)
+            return self._parameter(f"{limb}.{symbol}")
         bound = spec.get(symbol)
         if isinstance(bound, str) and (bound in names or bound in self.index):
             symbol = bound
@@ -172,14 +170,12 @@ class LimbReader(TableReader):
                 remedy=f"Described are {', '.join(names)}.",
             )  # fmt: skip
         elif bound is not None:
-            return quantity(bound, unit, place)
+            return Meant(*measured(bound, place))
         if symbol in names:
             actuator = self.actuators[names.index(symbol)]
-            if unit and actuator.unit != unit:
-                raise BadInput(f"{symbol} moves in {actuator.unit}, not in {unit}", place=place)
-            return Term("actuator", names.index(symbol), 1.0)
+            return Meant(Term("actuator", names.index(symbol), 1.0), actuator.unit)
         if symbol in self.index:
-            return self._parameter_term(symbol, unit, place)
+            return self._parameter(symbol)
         known = [*declared, *names, *spec, *self.table("parameters")]
         near = difflib.get_close_matches(symbol, known, 1)
         raise BadInput(
@@ -188,13 +184,9 @@ class LimbReader(TableReader):
             remedy=f'Did you mean "{near[0]}"?' if near else f"Set it in [limbs.{limb}].",
         )
 
-    def _parameter_term(self, name: str, unit: str, place: str) -> Term:
-        parameter = self.parameters[self.index[name]]
-        if unit and parameter.unit != unit:
-            raise BadInput(
-                f"{name} is in {parameter.unit}, a value in {unit} is needed", place=place
-            )
-        return Term("parameter", self.index[name], 1.0)
+    def _parameter(self, name: str) -> Meant:
+        index = self.index[name]
+        return Meant(Term("parameter", index, 1.0), self.parameters[index].unit)
 
     def _check_names(
         self,

@@ -101,7 +101,10 @@ class Newton:
         size = np.max(np.abs(dx), axis=0)
         if ds is not None:
             units = np.array(
-                [self.machine.size if a.unit == "mm" else 1.0 for a in self.machine.actuators]
+                [
+                    (self.machine.size if axis.moves == "mm" else 1.0) / axis.ratio
+                    for axis in self.machine.axes
+                ]
             )
             size = np.maximum(size, np.max(np.abs(ds) / units[:, None], axis=0))
         for limb, step in zip(closure.limbs, passive, strict=True):
