@@ -20,8 +20,6 @@ FALSE_ALARM = 1e-3
 """Probability that a run without a stray has a reading flagged."""
 MOST_STRAYS = 0.1
 """Part of the readings beyond which misfit is no matter of single readings."""
-CLEARLY = 5.0
-"""A stray misses by this many times the RMS misfit of the others at least."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +108,6 @@ def _worst(
     others = max((total - drop[worst]) / max(dof - 3.0, 1.0), 1.0)
     ratio = drop[worst] / 3.0 / others
     chance = count * float(stats.f.sf(ratio, 3, max(dof - 3.0, 1.0)))
-    if chance > FALSE_ALARM or ratio < CLEARLY**2 / 3.0:
+    if chance > FALSE_ALARM:
         return None, step
     return worst, step - spread[:, :, worst] @ freed[worst]
