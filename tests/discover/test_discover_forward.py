@@ -80,6 +80,26 @@ def test_effect_that_makes_the_holdout_rise_is_refused():
     assert holdouts == sorted(holdouts, reverse=True)
 
 
+@pytest.mark.parametrize("rise", [0.3, 0.02, 1e-4])
+def test_held_out_poses_have_the_veto_however_little_they_object(rise):
+    """The effect is really there and the diagnosis calls for it; unseen poses decide."""
+    lab = Lab(24)
+    refit = Refit(lab, hidden(lab, backlash=3.0), 4)
+    before = refit(()).holdout
+
+    def foreseeing(change):
+        def stage(names):
+            found = refit(names)
+            return replace(found, holdout=before * (1.0 + change)) if names else found
+
+        return discover(stage)
+
+    assert foreseeing(rise).last.effects == ()
+    assert "backlash" in foreseeing(rise).refused
+    assert foreseeing(-rise).last.effects == ("backlash",)
+    assert foreseeing(0.0).last.effects == ("backlash",)
+
+
 def test_effect_made_superfluous_is_taken_out():
     lab = Lab(28)
     refit = Refit(lab, hidden(lab, heat=25.0), 5)

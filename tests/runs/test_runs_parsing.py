@@ -198,3 +198,18 @@ def test_runs_folds_hold_whole_poses_and_do_not_change():
     counts = np.bincount([min(folds) for folds in by_label.values()])
     assert counts.tolist() == [16] * 5
     np.testing.assert_array_equal(fold, holdout_folds(run))
+
+
+def test_runs_folds_of_a_run_are_the_same_in_every_version():
+    """A hold-out is compared with last year's: pinned by pose, in the order of the file.
+
+    The last pose has no label: it is known by its q.
+    """
+    labels = [f"p{number}" for number in range(11)] + [""]
+    rows = [
+        f"{number}.0,{label},3,{number}.0,230.0,1.0,2.0,3.0,0.005,0.005,0.005,20.0"
+        for label in labels
+        for number in [labels.index(label)] * 2
+    ]
+    fold = holdout_folds(read("\n".join([HEADER, *rows, ""])))
+    assert fold[::2].tolist() == fold[1::2].tolist() == [0, 0, 0, 1, 3, 2, 1, 4, 3, 4, 1, 2]
