@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from discover_synthetic import POSES, Lab
 
-from calib.evidence import Candidate, Carrier, Term, Variable, diagnose, structure_candidates
+from calib.evidence import Candidate, Carrier, Variable, diagnose, structure_candidates
 from calib.evidence.bayes import observed
 from calib.evidence.pairs import prefers, rivals
 from calib.evidence.scores import score
+from calib.unknown import Unknown
 
 TOLD_APART = 0.8
 """Probability that the right one of two effects gets more evidence, from which they are told."""
@@ -83,7 +84,7 @@ def test_discover_unknown_structure_must_beat_the_effects_by_far():
         for seed in range(6):
             lab, generator = Lab(60 + seed), np.random.default_rng(seed)
             shape = lab.one(lab.direction[0], 0)
-            known = Candidate("play", (Term("play", "mm", 0.02),), shape[None, None])
+            known = Candidate("play", (Unknown("play", "mm", 0.02),), shape[None, None])
             axis = Carrier("axis", lab.one(np.ones(POSES), 0)[None], size=2.0)
             anyhow = structure_candidates(
                 [Variable("direction", np.tile(lab.direction[0], 2), (axis,))]
