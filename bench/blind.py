@@ -27,7 +27,7 @@ from bench._blind_page import INTRODUCTION, page
 from calib.discover.discovery import Refitter, discover_run, stage_of
 from calib.effects import catalogue
 from calib.errors import BadInput
-from calib.evidence.forward import SLACK, Discovery
+from calib.evidence.forward import Discovery, speaks_against
 from calib.mechanism.description import Machine
 from calib.poses.design import design_poses
 from calib.poses.readings import NestReadings
@@ -127,8 +127,8 @@ def _rose(found: Discovery) -> bool:
     """Whether held-out poses are predicted worse in the end than before the last effect added."""
     held = [step.stage.holdout for step in found.steps]
     added = [k for k, step in enumerate(found.steps) if step.added is not None]
-    risen = any(held[k] > held[k - 1] * (1.0 + SLACK) for k in added)
-    return risen or bool(added and held[-1] > held[added[-1] - 1] * (1.0 + SLACK))
+    risen = any(speaks_against(held[k - 1], held[k]) for k in added)
+    return risen or bool(added and speaks_against(held[added[-1] - 1], held[-1]))
 
 
 def _foreseen(

@@ -17,7 +17,7 @@ import pinocchio as pin
 from app.files.machines import load_machine
 from bench._hexapod_closed_form import HexapodClosedForm, PoseFirst
 from calib.arrays import Array
-from calib.mechanism.closure import State, _twists, sweep
+from calib.mechanism.closure import Standing, _twists, sweep
 from calib.mechanism.compiled import compile_machine
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
@@ -94,12 +94,7 @@ def _fixed(turns: bool, axis: int, value: float) -> pin.SE3:
 def open_limbs_ours(machine: Machine, configuration: Configuration) -> tuple[Array, Array]:
     """The same with the engine: end positions (3, L, N) and joint twists (6, joints, L, N)."""
     group = compile_machine(machine).groups[0]
-    state = State(
-        configuration.poses.position,
-        configuration.poses.rotation,
-        configuration.passive,
-        list(configuration.strain),
-    )
+    state = Standing.of(configuration)
     parameters = machine.nominal[:, None]
     point, _, screws = sweep(group, parameters, configuration.extension, state, state.strain[0])
     joints = [

@@ -7,14 +7,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from app.show.charts import ANGLE, LENGTH, save
-from calib.discover.compare import Comparison
+from calib.discover.compare import RunComparison
 from calib.discover.compare_report import acts_on, factor_of
 from calib.evidence.compare import Speaking
 
 MOST_PANELS = 6
 
 
-def write_charts(found: Comparison, folder: Path) -> list[Path]:
+def write_charts(found: RunComparison, folder: Path) -> list[Path]:
     """Write structure.png, workspace.png and actuators.png; returns what was written."""
     folder.mkdir(parents=True, exist_ok=True)
     written = []
@@ -30,7 +30,7 @@ def write_charts(found: Comparison, folder: Path) -> list[Path]:
     return written
 
 
-def _structure(found: Comparison) -> Figure | None:
+def _structure(found: RunComparison) -> Figure | None:
     """Added-variable pictures of the variables that speak; the first two if none does."""
     shown = [one for one in found.speaking if one.significant and one.bins][:MOST_PANELS]
     shown = shown or [one for one in found.speaking if one.bins][:2]
@@ -47,7 +47,7 @@ def _structure(found: Comparison) -> Figure | None:
     return figure
 
 
-def _dependence(axis: Axes, found: Comparison, one: Speaking) -> None:
+def _dependence(axis: Axes, found: RunComparison, one: Speaking) -> None:
     factor, unit = factor_of(one.unit)
     middle = np.array([0.5 * (each.low + each.high) for each in one.bins])
     value = factor * np.array([each.value for each in one.bins])
@@ -59,7 +59,7 @@ def _dependence(axis: Axes, found: Comparison, one: Speaking) -> None:
     axis.set_title(f"p = {one.p_value:.2g}", fontsize=9)
 
 
-def _workspace(found: Comparison) -> Figure:
+def _workspace(found: RunComparison) -> Figure:
     """Mean residual of every pose, seen from above and from the side."""
     figure = Figure(figsize=(9.0, 4.4), layout="constrained")
     position, shift = found.poses.position, 1000.0 * found.poses.shift
@@ -80,7 +80,7 @@ def _workspace(found: Comparison) -> Figure:
     return figure
 
 
-def _actuators(found: Comparison) -> Figure | None:
+def _actuators(found: RunComparison) -> Figure | None:
     """Error of each actuator that explains a pose's readings best, against its coordinate."""
     actuators = found.fit.model.rows.machine.actuators
     known = np.isfinite(found.poses.extension).all(axis=0)

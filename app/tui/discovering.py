@@ -15,7 +15,7 @@ from calib.discover.discovery import SEED, Refitter, discover_run, stage_of
 from calib.discover.report import diagnosis_report, effect_parameters
 from calib.effects import catalogue
 from calib.errors import BadInput
-from calib.evidence.forward import SLACK
+from calib.evidence.forward import speaks_against
 
 
 @dataclass(frozen=True)
@@ -75,17 +75,8 @@ class Search:
         before = self.present.run.holdout.rms_mm
         names = (*self.present.effects, name)
         after = self.refit(names).holdout
-        if math.isinf(after):
-            raise BadInput(
-                f"{name} is not accepted: the readings do not determine a model with it",
-                remedy="Choose another, or measure more",
-            )
-        if after > before * (1.0 + SLACK):
-            raise BadInput(
-                f"{name} is not accepted: poses that the fit has not seen would be predicted worse "
-                f"({1000 * before:.2f} -> {1000 * after:.2f} um)",
-                remedy="It fits noise. Choose another, or measure more",
-            )
+        if speaks_against(before, after):
+            raise _refused(name, before, after)
         self._climb(f"+ {name}", names)
         self._look(names)
 
@@ -119,3 +110,17 @@ class Search:
         run = self.refit(names).run
         comparison = compare_report(compare_fit(run.fit, np.random.default_rng(SEED)))
         self.view = View(names, run, diagnosis_report(run), comparison, effect_parameters(run.fit))
+
+
+def _refused(name: str, before: float, after: float) -> BadInput:
+    """Why an effect is not accepted; RMS over held-out poses before and after, mm."""
+    if math.isinf(after):
+        return BadInput(
+            f"{name} is not accepted: the readings do not determine a model with it",
+            remedy="Choose another, or measure more",
+        )
+    return BadInput(
+        f"{name} is not accepted: poses that the fit has not seen would be predicted worse "
+        f"({1000 * before:.2f} -> {1000 * after:.2f} um)",
+        remedy="It fits noise. Choose another, or measure more",
+    )

@@ -16,7 +16,7 @@ from app.show.compare_charts import write_charts
 from calib.discover.compare import compare_fit
 from calib.discover.compare_report import compare_report
 from calib.discover.discovery import SEED
-from calib.discover.terms import Proposal
+from calib.discover.terms import ProposedTerm
 from calib.discover.terms import propose as propose_terms
 
 SHOWN = 6
@@ -68,7 +68,7 @@ def command(
     answer.show(report, as_json, words(report))
 
 
-def _proposed(terms: list[Proposal], path: Path) -> list[dict[str, Any]]:
+def _proposed(terms: list[ProposedTerm], path: Path) -> list[dict[str, Any]]:
     """Write every stable term: FILE, FILE-2 ...; what was found, stable or not, as plain data."""
     listed = []
     stable = 0

@@ -13,7 +13,7 @@ from app import answer
 from app.analysis import load_refitter, model_options
 from app.files.poses import render_pose_file
 from app.files.runs import outside_runs
-from calib.discover.design import CANDIDATES, Plan, design_follow_up
+from calib.discover.design import CANDIDATES, FollowUpPlan, design_follow_up
 from calib.effects import effect_named
 from calib.errors import BadInput
 from calib.poses.design import labels_for
@@ -87,7 +87,7 @@ def command(
 
 
 def follow_up_report(
-    plan: Plan, discriminate: tuple[str, str], model: tuple[str, ...], runs: tuple[str, ...]
+    plan: FollowUpPlan, discriminate: tuple[str, str], model: tuple[str, ...], runs: tuple[str, ...]
 ) -> dict[str, Any]:
     """A plan as plain data (``pkm-follow-up/1``)."""
     names = plan.poses.machine.task.coordinates
@@ -109,7 +109,7 @@ def follow_up_report(
     }
 
 
-def _advice(plan: Plan, discriminate: tuple[str, str]) -> str:
+def _advice(plan: FollowUpPlan, discriminate: tuple[str, str]) -> str:
     worst, now = plan.certainty, min(plan.before.values())
     what = f"{discriminate[0]} from {discriminate[1]}"
     if now >= 0.95:
@@ -154,7 +154,7 @@ def _coordinate(name: str, value: float) -> str:
     return f"{value:.2f}" if name in "xyz" else f"{np.rad2deg(value):.3f}"
 
 
-def _poses_file(plan: Plan, report: dict[str, Any], seed: int, given: list[str]) -> str:
+def _poses_file(plan: FollowUpPlan, report: dict[str, Any], seed: int, given: list[str]) -> str:
     first, second = report["discriminate"]
     about: dict[str, Any] = {"discriminate": f"{first} {second}", "seed": seed}
     about |= {f"predicted_{name}": value for name, value in plan.after.items()}

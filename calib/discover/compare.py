@@ -7,9 +7,9 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray
 from calib.discover.problem import accepted, each_leg, every_leg, quadratics_of, variables_of
-from calib.evidence.compare import Speaking, Together, compare_structure
+from calib.evidence.compare import JointTest, Speaking, compare_structure
 from calib.evidence.repeats import PureError, pure_error
-from calib.evidence.structure import Carrier, Variable
+from calib.evidence.structure import Response, Variable
 from calib.identify.fitting import Fit
 from calib.mechanism.axes import units_of
 from calib.mechanism.rigid import rotate
@@ -41,7 +41,7 @@ class PoseResidual:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class RunComparison:
     """A model against a run; ``speaking`` has the state variable with the most structure first.
 
     ``displacement_mm`` is, for each of ``speaking``, the RMS over readings of what depends on it,
@@ -53,18 +53,18 @@ class Comparison:
     reference_repeatability: PureError
     speaking: tuple[Speaking, ...]
     displacement_mm: tuple[float, ...]
-    together: tuple[Together, ...]
+    together: tuple[JointTest, ...]
     poses: PoseResidual
 
 
-def compare_fit(fit: Fit, rng: np.random.Generator) -> Comparison:
+def compare_fit(fit: Fit, rng: np.random.Generator) -> RunComparison:
     """Compare a fitted model with its accepted readings."""
     problem = fit.problem
     speaking, together = compare_structure(
         problem, [*_of_machine(fit), *_of_reading(fit)], quadratics_of(fit), components=3, rng=rng
     )
     platform = fit.model.rows.on_platform
-    return Comparison(
+    return RunComparison(
         fit=fit,
         repeatability=_repeats(fit, platform),
         reference_repeatability=_repeats(fit, ~platform),
@@ -87,7 +87,7 @@ def _of_reading(fit: Fit) -> list[Variable]:
     rows, situation, kept = fit.model.rows, fit.linear.situation, fit.accepted
     count = fit.readings
     x, y, z = situation.point[:, kept]
-    points = Carrier("point", accepted(fit, np.swapaxes(rows.whitener, 0, 1)))
+    points = Response("point", accepted(fit, np.swapaxes(rows.whitener, 0, 1)))
     turned = np.moveaxis(situation.frame_rotation, 1, 0)
     platform = [
         rotate(situation.rotation, axis[:, None] * np.ones(rows.count)) for axis in np.eye(3)
@@ -101,7 +101,7 @@ def _of_reading(fit: Fit) -> list[Variable]:
         Variable("range", np.tile(np.sqrt(x**2 + y**2 + z**2), 3), (points,)),
         Variable("azimuth", np.tile(np.unwrap(np.arctan2(y, x)), 3), (points,)),
         Variable("elevation", np.tile(np.arctan2(z, np.hypot(x, y)), 3), (points,)),
-        Variable("nest", np.tile(nest, 3), (Carrier("seat", accepted(fit, seats)),), ("levels",)),
+        Variable("nest", np.tile(nest, 3), (Response("seat", accepted(fit, seats)),), ("levels",)),
     ]
     if np.any(rows.step):
         found += _steps(fit)

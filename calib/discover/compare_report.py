@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from calib.discover.compare import Comparison
+from calib.discover.compare import RunComparison
 from calib.evidence.compare import Speaking
 from calib.evidence.repeats import PureError
 
 
-def compare_report(found: Comparison) -> dict[str, Any]:
+def compare_report(found: RunComparison) -> dict[str, Any]:
     """Repeatability first, then state variables, the one with the most structure first."""
     fit = found.fit
     return {
@@ -41,7 +41,7 @@ def factor_of(unit: str) -> tuple[float, str]:
     return (1e6, "urad") if unit == "rad" else (1000.0, "um")
 
 
-def acts_on(found: Comparison, one: Speaking) -> str:
+def acts_on(found: RunComparison, one: Speaking) -> str:
     """In which direction a dependence shows most, in words."""
     machine = found.fit.model.rows.machine
     if one.acts_on.startswith("leg"):
@@ -50,7 +50,7 @@ def acts_on(found: Comparison, one: Speaking) -> str:
     return f"{'xyz'[one.axis]} of the {'nest' if one.acts_on == 'seat' else 'point'}"
 
 
-def _speaking(found: Comparison, one: Speaking, moved_mm: float) -> dict[str, Any]:
+def _speaking(found: RunComparison, one: Speaking, moved_mm: float) -> dict[str, Any]:
     factor, unit = factor_of(one.unit)
     return {
         "channel": one.channel,
@@ -84,7 +84,7 @@ def _repeatability(repeats: PureError) -> dict[str, Any] | None:
     }
 
 
-def _actuators(found: Comparison) -> list[dict[str, Any]]:
+def _actuators(found: RunComparison) -> list[dict[str, Any]]:
     actuators = found.fit.model.rows.machine.actuators
     known = np.isfinite(found.poses.extension).all(axis=0)
     if not known.any():
@@ -96,7 +96,7 @@ def _actuators(found: Comparison) -> list[dict[str, Any]]:
     ]
 
 
-def _worst(found: Comparison, count: int = 5) -> list[dict[str, Any]]:
+def _worst(found: RunComparison, count: int = 5) -> list[dict[str, Any]]:
     size = np.sqrt(np.sum(found.poses.shift**2, axis=0))
     return [
         {
@@ -108,7 +108,7 @@ def _worst(found: Comparison, count: int = 5) -> list[dict[str, Any]]:
     ]
 
 
-def _advice(found: Comparison) -> str:
+def _advice(found: RunComparison) -> str:
     loud = [one.channel for one in found.speaking if one.significant]
     repeats = found.repeatability
     if repeats.dof and repeats.p_value < 0.01 and repeats.excess > 0.5:

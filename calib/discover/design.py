@@ -13,8 +13,8 @@ import numpy as np
 from calib.arrays import Array
 from calib.discover.follow_up import FollowUp, own_to_each_run
 from calib.discover.old_and_new import (
+    OldAndNew,
     Side,
-    Together,
     blocks_of_side,
     effect_columns_then,
     matched,
@@ -28,7 +28,7 @@ from calib.evidence.candidate import Candidate
 from calib.evidence.diagnosis import diagnose
 from calib.evidence.family import family
 from calib.evidence.findings import Finding
-from calib.evidence.next_experiment import Blocks, choose_sequence
+from calib.evidence.next_experiment import CandidateBlocks, choose_sequence
 from calib.evidence.pairs import power, prefers
 from calib.evidence.problem import LinearProblem
 from calib.evidence.scores import score
@@ -45,7 +45,7 @@ WARMER_K = 10.0
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class FollowUpPlan:
     """Poses to visit in this order, and what they will tell.
 
     Attributes
@@ -80,7 +80,7 @@ def design_follow_up(
     candidates: int = CANDIDATES,
     conditions: Sequence[Mapping[str, float]] | None = None,
     watch: Callable[[str], None] | None = None,
-) -> Plan:
+) -> FollowUpPlan:
     """Choose ``count`` poses that tell two effects apart, or show one.
 
     Parameters
@@ -108,7 +108,7 @@ def design_follow_up(
     offered = [_candidate(side, side.now) for side in sides]
     hidden = [side.signature for side in sides]
     before = _chances(fit.problem, offered, hidden, rng)
-    best: Plan | None = None
+    best: FollowUpPlan | None = None
     for condition in conditions or default_conditions(fit, effects):
         if watch is not None:
             watch(", ".join(f"{k} = {v:g}" for k, v in condition.items()) or "as it was")
@@ -191,13 +191,13 @@ def _planned(
     condition: Mapping[str, float],
     before: dict[str, float],
     rng: np.random.Generator,
-) -> Plan:
+) -> FollowUpPlan:
     follow = FollowUp(fit, poses, condition)
-    together = Together(fit, follow)
+    together = OldAndNew(fit, follow)
     start = follow.approached(None)
     separations = [separation(side, rival_of(sides, side), together, start) for side in sides]
 
-    def offer(chosen: list[int]) -> list[Blocks]:
+    def offer(chosen: list[int]) -> list[CandidateBlocks]:
         rows = follow.approached(poses.q[:, chosen[-1]] if chosen else None)
         shared = together.new(rows)
         return [
@@ -206,11 +206,11 @@ def _planned(
 
     chosen = choose_sequence(separations, offer, count)
     after = _rehearsed(sides, together, chosen, rng)
-    return Plan(poses.take(np.array(chosen, dtype=np.intp)), dict(condition), before, after)
+    return FollowUpPlan(poses.take(np.array(chosen, dtype=np.intp)), dict(condition), before, after)
 
 
 def _rehearsed(
-    sides: Sequence[Side], together: Together, chosen: list[int], rng: np.random.Generator
+    sides: Sequence[Side], together: OldAndNew, chosen: list[int], rng: np.random.Generator
 ) -> dict[str, float]:
     """Probabilities of success with old and new readings in one fit."""
     follow = together.follow

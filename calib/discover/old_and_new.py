@@ -9,7 +9,7 @@ from calib.arrays import Array
 from calib.discover.follow_up import FollowUp, own_to_each_run
 from calib.effects.component import Effect
 from calib.evidence.candidate import Candidate
-from calib.evidence.next_experiment import Blocks, Separation
+from calib.evidence.next_experiment import CandidateBlocks, Separation
 from calib.identify.fitting import Fit
 from calib.identify.signatures import EffectColumns
 from calib.model.columns import at_trial
@@ -56,7 +56,7 @@ class Side:
         return np.asarray(self.amplitudes @ self.now)
 
 
-class Together:
+class OldAndNew:
     """Old readings and blocks of new ones over one list of unknowns.
 
     Unknowns in order: those of the fit (geometry, effects in it, old frames), what every run has
@@ -120,7 +120,7 @@ def rival_of(sides: Sequence[Side], side: Side) -> Side | None:
     return next((other for other in sides if other is not side), None)
 
 
-def _precision(together: Together, rival: Side | None) -> Array:
+def _precision(together: OldAndNew, rival: Side | None) -> Array:
     if rival is None:
         return together.precision
     own = rival.candidate.prior_precision
@@ -137,7 +137,7 @@ def _with_rival(shared: Array, rival: Side | None, now: bool, columns: Array | N
     return np.concatenate([shared, columns, none] if now else [shared, none, columns])
 
 
-def separation(side: Side, rival: Side | None, together: Together, rows: Rows) -> Separation:
+def separation(side: Side, rival: Side | None, together: OldAndNew, rows: Rows) -> Separation:
     """Readings that there are, and the base nests of the follow-up, which are always read."""
     follow = together.follow
     old = _with_rival(together.old(), rival, True, None if rival is None else rival.now)
@@ -166,10 +166,10 @@ def matched(side: Side, columns: Array) -> Array:
 
 
 def blocks_of_side(
-    side: Side, rival: Side | None, together: Together, shared: Array, rows: Rows
-) -> Blocks:
+    side: Side, rival: Side | None, together: OldAndNew, shared: Array, rows: Rows
+) -> CandidateBlocks:
     """Every candidate pose as the fit of the other side sees it."""
     follow = together.follow
     nuisance = _with_rival(shared, rival, False, _then(rival, follow, rows))
     signature = effect_columns_then(side, follow, rows)[1]
-    return Blocks(follow.by_pose(nuisance), follow.by_pose(signature[None])[:, 0])
+    return CandidateBlocks(follow.by_pose(nuisance), follow.by_pose(signature[None])[:, 0])

@@ -11,8 +11,8 @@ from calib.arrays import Array
 from calib.effects.tracker import rigid_motions
 from calib.evidence.candidate import Candidate, fill_missing
 from calib.evidence.problem import LinearProblem
-from calib.evidence.quadratic import Neighbours, Quadratic, blocks_of
-from calib.evidence.structure import Carrier, Variable
+from calib.evidence.quadratic import Neighbours, Quadratic, rigid_blocks
+from calib.evidence.structure import Response, Variable
 from calib.identify.fitting import Fit
 from calib.identify.signatures import EffectColumns
 from calib.mechanism.rigid import rotate, to_euler
@@ -35,19 +35,19 @@ def _candidate(fit: Fit, problem: LinearProblem, one: EffectColumns) -> Candidat
     return Candidate(one.effect.id, linear, columns, one.trials, subsets=subsets)
 
 
-def every_leg(fit: Fit) -> Carrier:
+def every_leg(fit: Fit) -> Response:
     """The extensions of all actuators, each in its own unit."""
     axes = fit.model.rows.machine.axes
     columns = accepted(fit, fit.linear.situation.actuator_columns)
     units = tuple(axis.unit for axis in axes)
-    return Carrier("legs", columns, units, tuple(axis.usual_error for axis in axes))
+    return Response("legs", columns, units, tuple(axis.usual_error for axis in axes))
 
 
-def each_leg(fit: Fit) -> list[Carrier]:
+def each_leg(fit: Fit) -> list[Response]:
     """The extension of one actuator, for every actuator."""
     legs = every_leg(fit)
     return [
-        Carrier(f"leg{k + 1}", legs.columns[[k]], *legs.scale(k))
+        Response(f"leg{k + 1}", legs.columns[[k]], *legs.scale(k))
         for k in range(legs.columns.shape[0])
     ]
 
@@ -68,7 +68,7 @@ def variables_of(fit: Fit) -> list[Variable]:
     """Everything that the residual could depend on, with what it could act on."""
     rows, situation = fit.model.rows, fit.linear.situation
     legs, own, axes = every_leg(fit), each_leg(fit), rows.machine.axes
-    points = Carrier("point", accepted(fit, np.swapaxes(rows.whitener, 0, 1)), "mm", 0.01)
+    points = Response("point", accepted(fit, np.swapaxes(rows.whitener, 0, 1)), "mm", 0.01)
     found = [
         Variable(f"q{k + 1}", _rows_of(fit, s), (leg,), ("smooth", "periodic"), axis.shortest)
         for k, (s, leg, axis) in enumerate(zip(rows.extension, own, axes, strict=True))
@@ -112,5 +112,5 @@ def quadratics_of(fit: Fit) -> list[Quadratic]:
         for run, name, on in zip(rows.run, rows.pose_name, rows.on_platform, strict=True)
     ]
     kept = [label for label, good in zip(labels, fit.accepted, strict=True) if good]
-    blocks = blocks_of(kept * 3, accepted(fit, whitened))
+    blocks = rigid_blocks(kept * 3, accepted(fit, whitened))
     return [*found, blocks] if blocks is not None else found

@@ -66,7 +66,7 @@ class Formula:
 
 
 @dataclass(frozen=True, eq=False)
-class Proposal:
+class ProposedTerm:
     """A term for what is left, as an operator's effect file.
 
     Attributes
@@ -188,7 +188,7 @@ def _points_of_time(fit: Fit) -> list[Formula]:
     return [Formula(text, ("mm", "mm"), "point", True, ("p", "s", low, span)) for text in texts]
 
 
-def propose(fit: Fit, rng: np.random.Generator) -> list[Proposal]:
+def propose(fit: Fit, rng: np.random.Generator) -> list[ProposedTerm]:
     """Propose terms for what a fit leaves, in the order in which they are called for."""
     formulas = library(fit)
     effects: list[OperatorEffect] = []
@@ -216,14 +216,14 @@ def _poses(fit: Fit) -> IntArray:
     return np.tile(one.astype(np.intp), 3)
 
 
-def _proposal(fit: Fit, formula: Formula, number: int, found: Selected) -> Proposal:
+def _proposal(fit: Fit, formula: Formula, number: int, found: Selected) -> ProposedTerm:
     moved = fit.model.rows.in_mm(found.fitted.reshape(3, -1), fit.accepted)
     said = ", ".join(one.format(a="a", b="b", c="c") for one in formula.text)
     says = f"proposed from the residual: {said}"
     if found.trial:
         name = formula.searched[0] if formula.searched else "x"
         said += f" with {name} near {found.trial[0]:.4g}"
-    return Proposal(
+    return ProposedTerm(
         formula=said,
         text=formula.table(f"found-{number + 1}", says, "abc"),
         selected=found,

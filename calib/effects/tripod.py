@@ -11,7 +11,7 @@ from calib.arrays import Array
 from calib.effects.component import Effect, Signature, Situation, Unknown, alone
 from calib.effects.gravity_sag import GravitySag, weight_wrench
 from calib.effects.thermal_growth import REFERENCE_C, ThermalGrowth
-from calib.mechanism.closure import Closure, State
+from calib.mechanism.closure import Closure, Standing
 from calib.mechanism.description import Machine
 from calib.runs.stack import Rows
 
@@ -61,9 +61,8 @@ def _platform_compliance(situation: Situation) -> Array:
     In the engine's scaled twists (translations as parts of the machine's size).
     """
     closed, held = situation.closed, situation.parameters
-    state = State(closed.poses.position, closed.poses.rotation, closed.passive, list(closed.strain))
     columns = held[:, None] if held.ndim == 1 else held
-    rows, _ = Closure(situation.closing, columns, closed.extension, state).rows()
+    rows, _ = Closure(situation.closing, columns, closed.extension, Standing.of(closed)).rows()
     stacked = np.moveaxis(rows, -1, 0)
     inverse = np.linalg.inv(np.swapaxes(stacked, 1, 2) @ stacked)
     return np.asarray(np.moveaxis(inverse, 0, -1))

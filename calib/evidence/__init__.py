@@ -9,30 +9,30 @@ whitened columns, one block for each trial of a nonlinear unknown), and answers 
 from calib.evidence.candidate import Candidate, fill_missing
 from calib.evidence.diagnosis import diagnose
 from calib.evidence.findings import Diagnosis, Finding, Unexplained
-from calib.evidence.forward import Discovery, Stage, Step, discover
+from calib.evidence.forward import Discovery, Revision, Stage, discover
 from calib.evidence.problem import LinearProblem
-from calib.evidence.quadratic import Blocks, Neighbours, blocks_of
+from calib.evidence.quadratic import Neighbours, RigidBlocks, rigid_blocks
 from calib.evidence.repeats import PureError, pure_error
-from calib.evidence.structure import Carrier, Variable, structure_candidates
+from calib.evidence.structure import Response, Variable, structure_candidates
 
 __all__ = [
-    "Blocks",
     "Candidate",
-    "Carrier",
     "Diagnosis",
     "Discovery",
     "Finding",
     "LinearProblem",
     "Neighbours",
     "PureError",
+    "Response",
+    "Revision",
+    "RigidBlocks",
     "Stage",
-    "Step",
     "Unexplained",
     "Variable",
-    "blocks_of",
     "diagnose",
     "discover",
     "fill_missing",
     "pure_error",
+    "rigid_blocks",
     "structure_candidates",
 ]

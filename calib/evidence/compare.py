@@ -2,8 +2,8 @@
 
 A picture of a dependence is an added-variable picture: the readings are binned by the variable,
 and for all bins together the extension (or displacement) is estimated that the residual asks for,
-b = (A M A^T + 1 / (2 size)^2)^-1 A e with A the carrier in each bin: what the fit could have
-absorbed is accounted for, and the prior of twice the carrier's size stands for what it did absorb.
+b = (A M A^T + 1 / (2 size)^2)^-1 A e with A the response in each bin: what the fit could have
+absorbed is accounted for, and the prior of twice the response's size stands for what it did absorb.
 Their mean is taken off: a constant is nobody's dependence.
 """
 
@@ -21,7 +21,7 @@ from calib.evidence.family import family
 from calib.evidence.problem import LinearProblem
 from calib.evidence.quadratic import Quadratic
 from calib.evidence.scores import Scores, score
-from calib.evidence.structure import Carrier, Variable, structure_candidates
+from calib.evidence.structure import Response, Variable, structure_candidates
 
 MOST_BINS = 8
 
@@ -45,7 +45,7 @@ class Speaking:
     ----------
     channel : str
     acts_on : str
-        Carrier through which the dependence is strongest; ``axis`` its direction, from 0.
+        Response through which the dependence is strongest; ``axis`` its direction, from 0.
     unit : str
         Of the bins' values.
     p_value : float
@@ -75,7 +75,7 @@ class Speaking:
 
 
 @dataclass(frozen=True)
-class Together:
+class JointTest:
     """A test of structure that no single variable shows (neighbours in time, poses as a whole)."""
 
     channel: str
@@ -91,7 +91,7 @@ def compare_structure(
     components: int,
     rng: np.random.Generator,
     alpha: float = ALPHA,
-) -> tuple[list[Speaking], list[Together]]:
+) -> tuple[list[Speaking], list[JointTest]]:
     """Look at the residual against every variable, the one with the most structure first.
 
     Parameters
@@ -99,7 +99,7 @@ def compare_structure(
     problem : LinearProblem
         Components of a reading are ``R / components`` apart (axis after axis).
     variables : sequence of Variable
-    quadratic : sequence of Neighbours or Blocks
+    quadratic : sequence of Neighbours or RigidBlocks
     components : int
         Components of a reading.
     rng : numpy Generator
@@ -124,7 +124,7 @@ def compare_structure(
     together = []
     for number, test in enumerate(quadratic):
         log_p = joint.log_p(float(joint.strengths[len(named) + number, 0]))
-        together.append(Together(test.channel, _p(log_p), _below(log_p, alpha)))
+        together.append(JointTest(test.channel, _p(log_p), _below(log_p, alpha)))
     return speaking, together
 
 
@@ -153,21 +153,21 @@ def _speaking(
     beta, _ = scores.estimate(index, trial, subset)
     whitened = weighing.whiten[trial] @ scores.scores[index][trial, list(subset), 0]
     acts_on = candidate.name.partition("(")[2].rstrip(")").partition(",")[0]
-    carrier = next(each for each in variable.carriers if each.name == acts_on)
+    response = next(each for each in variable.responses if each.name == acts_on)
     period = candidate.trials[trial][0] if candidate.trials[trial] else None
     shown = variable
     if period is not None:
         shown = replace(variable, values=np.mod(variable.values, period))
     pictures = [
-        _binned(scores.problem, shown, carrier, axis, components)
-        for axis in range(carrier.columns.shape[0])
+        _binned(scores.problem, shown, response, axis, components)
+        for axis in range(response.columns.shape[0])
     ]
     axis = int(np.argmax([sum((b.value / b.sigma) ** 2 for b in bins) for bins in pictures]))
     return Speaking(
         channel=variable.name,
         acts_on=acts_on,
         axis=axis,
-        unit=carrier.scale(axis)[0],
+        unit=response.scale(axis)[0],
         p_value=_p(log_p),
         significant=_below(log_p, alpha),
         chi2_fall=float(whitened @ whitened),
@@ -179,10 +179,10 @@ def _speaking(
 
 
 def _binned(
-    problem: LinearProblem, variable: Variable, carrier: Carrier, axis: int, components: int
+    problem: LinearProblem, variable: Variable, response: Response, axis: int, components: int
 ) -> tuple[Bin, ...]:
-    """Estimates per bin of a variable along one direction of a carrier."""
-    column = carrier.columns[axis]
+    """Estimates per bin of a variable along one direction of a response."""
+    column = response.columns[axis]
     values = variable.values if variable.values.ndim == 1 else variable.values[axis]
     seen = column != 0.0
     if not seen.any():
@@ -190,7 +190,7 @@ def _binned(
     edges = _edges(values[seen])
     inside = np.array([seen & (values >= low) & (values <= high) for low, high in edges])
     shapes = column * inside
-    size = carrier.scale(axis)[1]
+    size = response.scale(axis)[1]
     weight = shapes @ problem.project(shapes).T + np.eye(len(edges)) / (2.0 * size) ** 2
     covariance = np.linalg.inv(weight)
     centred = np.eye(len(edges)) - 1.0 / len(edges)

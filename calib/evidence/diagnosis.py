@@ -59,7 +59,7 @@ def diagnose(
         Known effects that are not in the fit.
     structure : sequence of Candidate
         See :func:`calib.evidence.structure.structure_candidates`.
-    quadratic : sequence of Neighbours or Blocks
+    quadratic : sequence of Neighbours or RigidBlocks
     rng : numpy Generator
         Draws the null distribution; the same seed gives the same answer.
     draws : int

@@ -43,7 +43,7 @@ class Stage(Protocol):
 
 
 @dataclass(frozen=True)
-class Step:
+class Revision:
     """What was done: ``added`` or ``removed`` an effect (both None at the start)."""
 
     stage: Stage
@@ -55,7 +55,7 @@ class Step:
 class Discovery:
     """The staircase: accepted steps, effects refused in the end, and groups seen on the way."""
 
-    steps: tuple[Step, ...]
+    steps: tuple[Revision, ...]
     refused: tuple[str, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
 
@@ -82,7 +82,7 @@ def discover(
     keep : sequence of str
         Effects that the operator has put in and that stay.
     """
-    steps = [Step(refit(begin))]
+    steps = [Revision(refit(begin))]
     refused: list[str] = []
     groups: list[tuple[str, ...]] = []
     while len(steps) <= MOST_STEPS:
@@ -91,16 +91,24 @@ def discover(
         if added is None:
             break
         tried = refit((*now.effects, added))
-        if math.isinf(tried.holdout) or tried.holdout > now.holdout * (1.0 + SLACK):
+        if speaks_against(now.holdout, tried.holdout):
             refused.append(added)
             continue
         groups += [group for group in now.diagnosis.indistinguishable if group not in groups]
-        steps.append(Step(tried, added=added))
+        steps.append(Revision(tried, added=added))
         refused = []
     steps += _superfluous(refit, steps, frozenset((*begin, *keep)))
     last = steps[-1].stage.effects
     here = [group for group in groups if set(group) & set(last)]
     return Discovery(tuple(steps), tuple(refused), tuple(here))
+
+
+def speaks_against(before: float, after: float) -> bool:
+    """Whether held-out poses refuse a larger model, by the RMS over them without and with it.
+
+    They do where they are predicted worse, or not at all (infinite); nan decides nothing.
+    """
+    return math.isinf(after) or after > before * (1.0 + SLACK)
 
 
 def _next(stage: Stage, refused: Sequence[str]) -> str | None:
@@ -118,13 +126,13 @@ def _next(stage: Stage, refused: Sequence[str]) -> str | None:
 
 
 def _superfluous(
-    refit: Callable[[tuple[str, ...]], Stage], taken: Sequence[Step], keep: frozenset[str]
-) -> list[Step]:
+    refit: Callable[[tuple[str, ...]], Stage], taken: Sequence[Revision], keep: frozenset[str]
+) -> list[Revision]:
     """Take out effects, the first added first, that the others have made superfluous.
 
     The hold-out may rise by ``BY_CHANCE``, but not to where it was before the last effect.
     """
-    steps: list[Step] = []
+    steps: list[Revision] = []
     before = taken[-2].stage.holdout if len(taken) > 1 else float("inf")
     for name in taken[-1].stage.effects:
         now = steps[-1].stage if steps else taken[-1].stage
@@ -133,5 +141,5 @@ def _superfluous(
         without = refit(tuple(other for other in now.effects if other != name))
         limit = min(now.holdout * (1.0 + BY_CHANCE), before)
         if without.holdout <= limit and without.diagnosis.adequate:
-            steps.append(Step(without, removed=name))
+            steps.append(Revision(without, removed=name))
     return steps

@@ -65,7 +65,7 @@ def _solve(matrices: Array, vectors: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Blocks:
+class CandidateBlocks:
     """C candidate blocks of m readings' components for one hypothesis.
 
     ``nuisance`` (C, n, m) of the other side, ``signature`` (C, m) of the hypothesis.
@@ -77,7 +77,7 @@ class Blocks:
 
 def choose_sequence(
     sides: Sequence[Separation],
-    offer: Callable[[list[int]], Sequence[Blocks]],
+    offer: Callable[[list[int]], Sequence[CandidateBlocks]],
     count: int,
 ) -> list[int]:
     """Choose ``count`` blocks one after the other; each may be chosen once.

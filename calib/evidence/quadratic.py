@@ -30,7 +30,7 @@ class Neighbours:
 
 
 @dataclass(frozen=True, eq=False)
-class Blocks:
+class RigidBlocks:
     """Is more of the residual in given subspaces than noise would put there?
 
     ``members`` (B, m) indices of components of each block (one pose, several nests) and ``bases``
@@ -52,10 +52,10 @@ class Blocks:
         return -log_tail(ratio * dof / null.mean(), dof)
 
 
-Quadratic = Neighbours | Blocks
+Quadratic = Neighbours | RigidBlocks
 
 
-def blocks_of(labels: Sequence[object], columns: Array) -> Blocks | None:
+def rigid_blocks(labels: Sequence[object], columns: Array) -> RigidBlocks | None:
     """Blocks of components with the same label, moving along ``columns``.
 
     Parameters
@@ -81,4 +81,4 @@ def blocks_of(labels: Sequence[object], columns: Array) -> Blocks | None:
         return None
     motions = np.moveaxis(columns[:, members], 0, -1)
     bases = np.swapaxes(np.linalg.qr(motions)[0], 1, 2)
-    return Blocks(members, bases)
+    return RigidBlocks(members, bases)

@@ -83,7 +83,7 @@ def explore(
     ----------
     scores : Scores
         Of candidates of which the first ``effects`` are known effects, the rest structure.
-    quadratic : sequence of Neighbours or Blocks
+    quadratic : sequence of Neighbours or RigidBlocks
     alpha : float
         Family-wise false alarm of each round.
     rng : numpy Generator

@@ -1,9 +1,9 @@
 """Structure of unknown origin: does the residual depend on any state variable, in any way?
 
-Carriers are directions in which something could move the readings (each actuator's extension,
+Responses are directions in which something could move the readings (each actuator's extension,
 the point in space); variables are what it could depend on (pose coordinates, actuators, direction
 of approach, time, temperature, payload, nest, range and angles of the tracker). A structure
-candidate is every carrier times a few smooth functions of one variable. It is scored like an
+candidate is every response times a few smooth functions of one variable. It is scored like an
 effect, and says what the rest depends on, not why.
 """
 
@@ -27,7 +27,7 @@ Kind = Literal["smooth", "levels", "periodic"]
 
 
 @dataclass(frozen=True, eq=False)
-class Carrier:
+class Response:
     """Directions in which readings can be moved.
 
     ``columns`` (c, R) whitened displacement of the readings per ``unit``; ``size`` in that unit
@@ -54,9 +54,9 @@ class Variable:
     name : str
         Channel: ``q1``, ``time_s``, ``direction``, ``x``, ``structure_temp_C`` ...
     values : (R,) or (c, R)
-        One value for each component; one row for each of the carrier's directions where each has
+        One value for each component; one row for each of the response's directions where each has
         a value of its own (direction of approach of each actuator).
-    carriers : tuple of Carrier
+    responses : tuple of Response
         What it may act on; each makes a candidate.
     kinds : tuple of "smooth", "levels", "periodic"
     shortest : float, optional
@@ -65,7 +65,7 @@ class Variable:
 
     name: str
     values: Array
-    carriers: tuple[Carrier, ...]
+    responses: tuple[Response, ...]
     kinds: tuple[Kind, ...] = ("smooth",)
     shortest: float | None = None
 
@@ -76,35 +76,35 @@ def structure_candidates(variables: Sequence[Variable]) -> list[Candidate]:
     for variable in variables:
         if not np.isfinite(variable.values).all() or np.ptp(variable.values) == 0.0:
             continue
-        for carrier in variable.carriers:
+        for response in variable.responses:
             for kind in variable.kinds:
                 if kind == "smooth":
-                    found.append(_smooth(variable, carrier))
+                    found.append(_smooth(variable, response))
                 elif kind == "levels":
-                    found.append(_levels(variable, carrier))
+                    found.append(_levels(variable, response))
                 else:
-                    found.append(_periodic(variable, carrier))
+                    found.append(_periodic(variable, response))
     return found
 
 
-def _smooth(variable: Variable, carrier: Carrier) -> Candidate:
+def _smooth(variable: Variable, response: Response) -> Candidate:
     """Polynomials up to the order that the distinct values allow; lower orders stand alone too."""
-    values = np.broadcast_to(variable.values, carrier.columns.shape)
+    values = np.broadcast_to(variable.values, response.columns.shape)
     distinct = min(np.unique(row).size for row in values)
     order = max(1, min(ORDER, distinct - 1))
     low, high = variable.values.min(), variable.values.max()
     shapes = _legendre(2.0 * (values - low) / (high - low) - 1.0, order)
-    columns = (shapes * carrier.columns).reshape(1, -1, carrier.columns.shape[1])
-    count = carrier.columns.shape[0]
+    columns = (shapes * response.columns).reshape(1, -1, response.columns.shape[1])
+    count = response.columns.shape[0]
     subsets = [tuple(range(count * top)) for top in range(1, order)]
     if count > 1:
         subsets += [tuple(range(axis, count * order, count)) for axis in range(count)]
     unknowns = tuple(
-        Unknown(f"{variable.name}.{carrier.name}{axis + 1}.P{power}", *carrier.scale(axis))
+        Unknown(f"{variable.name}.{response.name}{axis + 1}.P{power}", *response.scale(axis))
         for power in range(1, order + 1)
         for axis in range(count)
     )
-    name = f"{variable.name} ({carrier.name})"
+    name = f"{variable.name} ({response.name})"
     return Candidate(name, unknowns, columns, subsets=tuple(subsets), channel=variable.name)
 
 
@@ -113,43 +113,43 @@ def _legendre(scaled: Array, order: int) -> Array:
     return np.asarray(np.moveaxis(legendre.legvander(scaled, order), -1, 0)[1:], dtype=np.float64)
 
 
-def _levels(variable: Variable, carrier: Carrier) -> Candidate:
+def _levels(variable: Variable, response: Response) -> Candidate:
     """A constant for every distinct value (nests, passes)."""
     levels = np.unique(variable.values)
     shapes = (variable.values == levels[:, None])[:, None, :]
-    columns = (shapes * carrier.columns).reshape(1, -1, carrier.columns.shape[1])
-    count = carrier.columns.shape[0]
+    columns = (shapes * response.columns).reshape(1, -1, response.columns.shape[1])
+    count = response.columns.shape[0]
     unknowns = tuple(
-        Unknown(f"{variable.name}.{carrier.name}{axis + 1}.{level:g}", *carrier.scale(axis))
+        Unknown(f"{variable.name}.{response.name}{axis + 1}.{level:g}", *response.scale(axis))
         for level in levels
         for axis in range(count)
     )
     subsets = tuple(
         tuple(range(count * level, count * (level + 1))) for level in range(levels.size)
     )
-    name = f"{variable.name} ({carrier.name}, levels)"
+    name = f"{variable.name} ({response.name}, levels)"
     return Candidate(name, unknowns, columns, subsets=subsets, channel=variable.name)
 
 
-def _periodic(variable: Variable, carrier: Carrier) -> Candidate:
+def _periodic(variable: Variable, response: Response) -> Candidate:
     """A sine and a cosine for every direction, at frequencies of :func:`_frequencies`."""
-    values = np.broadcast_to(variable.values, carrier.columns.shape)
+    values = np.broadcast_to(variable.values, response.columns.shape)
     span = float(np.ptp(values, axis=1).max())
     apart = np.diff(np.unique(variable.values))
     shortest = variable.shortest or max(2.0 * float(np.median(apart)), span / 100.0)
     frequencies = _frequencies(span, shortest)
     phase = 2.0 * np.pi * frequencies[:, None, None] * (values - values.min())
     columns = np.concatenate([np.sin(phase), np.cos(phase)], axis=1)
-    columns *= np.concatenate([carrier.columns, carrier.columns])
-    count = carrier.columns.shape[0]
+    columns *= np.concatenate([response.columns, response.columns])
+    count = response.columns.shape[0]
     unknowns = tuple(
-        Unknown(f"{variable.name}.{carrier.name}{axis + 1}.{wave}", *carrier.scale(axis))
+        Unknown(f"{variable.name}.{response.name}{axis + 1}.{wave}", *response.scale(axis))
         for wave in ("sin", "cos")
         for axis in range(count)
     )
     subsets = tuple((axis, count + axis) for axis in range(count)) if count > 1 else ()
     return Candidate(
-        f"{variable.name} ({carrier.name}, periodic)",
+        f"{variable.name} ({response.name}, periodic)",
         unknowns,
         columns,
         trials=tuple((float(1.0 / f),) for f in frequencies),

@@ -9,7 +9,7 @@ import numpy as np
 
 from calib.arrays import Array, Numbers
 from calib.errors import BadInput
-from calib.mechanism.closure import Closure, State, passive_twists
+from calib.mechanism.closure import Closure, Standing, passive_twists
 from calib.mechanism.compiled import compile_machine
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
@@ -89,12 +89,12 @@ def _joint_counts(machine: Machine, place: Place) -> None:
         )
 
 
-def _home_state(machine: Machine, shake: float) -> State:
+def _home_state(machine: Machine, shake: float) -> Standing:
     """Stated home with the rough joint angles, moved by a fixed pattern of size ``shake`` rad."""
     compiled = compile_machine(machine)
     pattern = np.sin(1.0 + 2.4 * np.arange(compiled.joint_count))
     units = np.array([1.0 if joint.turns else machine.size for joint in machine.joints])
-    return State(
+    return Standing(
         np.array(machine.home[:3])[:, None],
         from_euler(*np.array(machine.home[3:]))[:, :, None],
         (compiled.joint_start + shake * pattern * units)[:, None],

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.arrays import Array, Numbers
+from calib.arrays import Array, Numbers, Selection
 from calib.mechanism.compiled import (
     ArrayElement,
     Compiled,
@@ -27,6 +27,7 @@ from calib.mechanism.compiled import (
     compile_machine,
     element_value,
 )
+from calib.mechanism.configuration import Configuration
 from calib.mechanism.description import Kind, Machine
 from calib.mechanism.elastic import (
     RowWeights,
@@ -41,7 +42,7 @@ from calib.mechanism.rigid import cross, small_rotation
 
 
 @dataclass(eq=False)
-class State:
+class Standing:
     """Where the machine is during a solution; changed in place by the solver.
 
     ``position`` (3, N), ``rotation`` (3, 3, N), ``passive`` (n_joints, N) and, for each group of
@@ -52,6 +53,21 @@ class State:
     rotation: Numbers
     passive: Numbers
     strain: list[Numbers]
+
+    @classmethod
+    def of(cls, closed: Configuration) -> "Standing":
+        """Where a closed machine stands."""
+        poses = closed.poses
+        return cls(poses.position, poses.rotation, closed.passive, list(closed.strain))
+
+    def take(self, which: Selection) -> "Standing":
+        """Poses selected by index, slice or mask."""
+        return Standing(
+            self.position[:, which],
+            self.rotation[:, :, which],
+            self.passive[:, which],
+            [strain[:, :, which] for strain in self.strain],
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +140,7 @@ def _needs_screw(element: ArrayElement) -> bool:
 
 
 def sweep(
-    group: Group, parameters: Numbers, extension: Numbers, state: State, strain: Numbers
+    group: Group, parameters: Numbers, extension: Numbers, state: Standing, strain: Numbers
 ) -> tuple[Numbers, Numbers, tuple[Screw | None, ...]]:
     """Walk along the chains of a group: end position (3, L, N), rotation (3, 3, L, N), screws."""
     columns = [np.eye(3)[j].reshape(3, 1, 1) for j in range(3)]
@@ -195,12 +211,12 @@ class Closure:
     machine : Machine
     parameters : (P, 1) or (P, N), mm or rad
     extension : (n, N), mm or rad
-    state : State
+    state : Standing
         Where the machine is now.
     """
 
     def __init__(
-        self, machine: Machine, parameters: Numbers, extension: Numbers, state: State
+        self, machine: Machine, parameters: Numbers, extension: Numbers, state: Standing
     ) -> None:
         self.machine = machine
         self.compiled: Compiled = compile_machine(machine)
@@ -213,7 +229,7 @@ class Closure:
         ]
 
     def _linearise(
-        self, group: Group, extension: Numbers, state: State, strain: Numbers
+        self, group: Group, extension: Numbers, state: Standing, strain: Numbers
     ) -> LinearLimbs:
         size = self.machine.size
         point, rotation, screws = sweep(group, self.parameters, extension, state, strain)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.arrays import Numbers
-from calib.mechanism.closure import Closure, State
+from calib.mechanism.closure import Closure, Standing
 from calib.mechanism.description import Kind, Machine
 from calib.mechanism.householder import Reflectors
 from calib.mechanism.newton import platform_solver
@@ -47,16 +47,11 @@ def pose_jacobians(
     dtype = np.result_type(held, configuration.poses.position)
     by_parameter = np.zeros((len(machine.parameters), 6, count), dtype=dtype)
     by_actuator = np.zeros((len(machine.actuators), 6, count), dtype=dtype)
+    standing = Standing.of(configuration)
     for first in range(0, count, CHUNK):
         part = slice(first, min(first + CHUNK, count))
-        state = State(
-            configuration.poses.position[:, part],
-            configuration.poses.rotation[:, :, part],
-            configuration.passive[:, part],
-            [e[:, :, part] for e in configuration.strain],
-        )
         own = held if held.shape[1] == 1 else held[:, part]
-        closure = Closure(machine, own, configuration.extension[:, part], state)
+        closure = Closure(machine, own, configuration.extension[:, part], standing.take(part))
         rows, _ = closure.rows()
         solver = platform_solver(rows, machine)
         inverse_rows = _pseudo_inverse(solver, rows.shape[0], machine.size)

@@ -6,7 +6,7 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray, IntArray, Numbers
 from calib.errors import BadInput
-from calib.mechanism.closure import Closure, State
+from calib.mechanism.closure import Closure, Standing
 from calib.mechanism.configuration import Configuration
 from calib.mechanism.description import Machine
 from calib.mechanism.householder import Reflectors, factorise
@@ -40,7 +40,7 @@ class Newton:
     machine: Machine
     parameters: Numbers
     extension: Numbers
-    state: State
+    state: Standing
     target: Numbers | None
     """Task coordinates (n, N) of an inverse problem; None for a forward one."""
     conditioning: Array
@@ -134,18 +134,12 @@ class Newton:
 
     def keep(self, which: BoolArray) -> None:
         """Go on with some of the poses only."""
-        state = self.state
         if self.parameters.shape[1] > 1:
             self.parameters = self.parameters[:, which]
         self.extension = self.extension[:, which]
         if self.target is not None:
             self.target = self.target[:, which]
-        self.state = State(
-            state.position[:, which],
-            state.rotation[:, :, which],
-            state.passive[:, which],
-            [e[:, :, which] for e in state.strain],
-        )
+        self.state = self.state.take(which)
 
 
 @dataclass(eq=False)

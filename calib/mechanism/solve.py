@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from calib.arrays import Array, Numbers
-from calib.mechanism.closure import Closure, State
+from calib.mechanism.closure import Closure, Standing
 from calib.mechanism.compiled import compile_machine
 from calib.mechanism.configuration import Configuration, joined
 from calib.mechanism.description import Machine
@@ -36,11 +36,11 @@ SETTLING = 12
 """Steps in which limbs settle at the stated home before the machine is closed."""
 
 
-def _start_state(machine: Machine, count: int, dtype: np.dtype[np.generic]) -> State:
+def _start_state(machine: Machine, count: int, dtype: np.dtype[np.generic]) -> Standing:
     """Home pose and rough joint values of the machine file, for ``count`` poses."""
     compiled = compile_machine(machine)
     rotation = from_euler(*np.array(machine.home[3:]))
-    return State(
+    return Standing(
         np.repeat(np.array(machine.home[:3], dtype=dtype)[:, None], count, axis=1),
         np.repeat(rotation.astype(dtype)[:, :, None], count, axis=2),
         np.repeat(compiled.joint_start.astype(dtype)[:, None], count, axis=1),
@@ -48,7 +48,7 @@ def _start_state(machine: Machine, count: int, dtype: np.dtype[np.generic]) -> S
     )
 
 
-def settle_limbs(machine: Machine, extension: Array, state: State) -> None:
+def settle_limbs(machine: Machine, extension: Array, state: Standing) -> None:
     """Bring every limb's end as near to the platform as its passive joints can, platform held.
 
     Rough joint angles (all zero, say) may be singular for the limbs together; after this they are
@@ -108,13 +108,13 @@ def _guess(machine: Machine, extension: Array) -> Configuration:
 
 def _state_from(
     start: Configuration, count: int, dtype: np.dtype[np.generic], part: slice
-) -> State:
+) -> Standing:
     def spread(a: Numbers) -> Numbers:
         if a.shape[-1] == 1:
             return np.repeat(a.astype(dtype), count, axis=-1)
         return a[..., part].astype(dtype)
 
-    return State(
+    return Standing(
         spread(start.poses.position),
         spread(start.poses.rotation),
         spread(start.passive),

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.arrays import Array, BoolArray, Numbers
-from calib.mechanism.closure import Closure, State, passive_twists
+from calib.mechanism.closure import Closure, Standing, passive_twists
+from calib.mechanism.configuration import joined
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.limits import within_limits
@@ -60,7 +61,7 @@ def survey(machine: Machine) -> Survey:
         asked = _nearer_home(machine, asked, task_values(machine.task, home.poses))
         found = inverse(machine, asked)
         usable = found.converged & within_limits(machine, found)
-    configuration = joined(home, found.take(np.flatnonzero(usable)))
+    configuration = joined([home, found.take(np.flatnonzero(usable))])
     stiffness, side = _singularity(machine, configuration)
     moves = pose_jacobians(machine, configuration).parameters
     moves[:, 3:] *= machine.size
@@ -96,36 +97,10 @@ def _nearer_home(machine: Machine, asked: Array, home: Array) -> Array:
     return values
 
 
-def joined(first: Configuration, second: Configuration) -> Configuration:
-    """Configurations of one machine, one after the other."""
-
-    def both(a: Array, b: Array) -> Array:
-        whole: Array = np.concatenate([a, b], axis=-1)
-        return whole
-
-    return Configuration(
-        type(first.poses)(
-            both(first.poses.position, second.poses.position),
-            both(first.poses.rotation, second.poses.rotation),
-        ),
-        both(first.extension, second.extension),
-        both(first.passive, second.passive),
-        tuple(both(a, b) for a, b in zip(first.strain, second.strain, strict=True)),
-        np.concatenate([first.converged, second.converged]),
-        np.concatenate([first.iterations, second.iterations]),
-        both(first.conditioning, second.conditioning),
-    )
-
-
 def closure_at(machine: Machine, configuration: Configuration) -> Closure:
     """The closure linearised at closed configurations, nominal parameters."""
-    state = State(
-        configuration.poses.position,
-        configuration.poses.rotation,
-        configuration.passive,
-        list(configuration.strain),
-    )
-    return Closure(machine, machine.nominal[:, None], configuration.extension, state)
+    standing = Standing.of(configuration)
+    return Closure(machine, machine.nominal[:, None], configuration.extension, standing)
 
 
 def unit_rows(closure: Closure) -> Numbers:

@@ -6,6 +6,7 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray, Selection
 from calib.errors import BadInput
+from calib.mechanism.configuration import joined
 from calib.mechanism.description import Machine
 from calib.mechanism.limits import within_limits
 from calib.mechanism.rigid import Poses
@@ -138,23 +139,5 @@ def _joined(machine: Machine, parts: list[PoseSet]) -> PoseSet:
     return PoseSet(
         machine,
         np.concatenate([part.task for part in parts], axis=1),
-        join_configurations([part.configuration for part in parts]),
-    )
-
-
-def join_configurations(parts: list[Configuration]) -> Configuration:
-    """Configurations of the same machine, one after the other."""
-    return Configuration(
-        Poses(
-            np.concatenate([p.poses.position for p in parts], axis=-1),
-            np.concatenate([p.poses.rotation for p in parts], axis=-1),
-        ),
-        np.concatenate([p.extension for p in parts], axis=-1),
-        np.concatenate([p.passive for p in parts], axis=-1),
-        tuple(
-            np.concatenate(group, axis=-1) for group in zip(*(p.strain for p in parts), strict=True)
-        ),
-        np.concatenate([p.converged for p in parts]),
-        np.concatenate([p.iterations for p in parts]),
-        np.concatenate([p.conditioning for p in parts]),
+        joined([part.configuration for part in parts]),
     )

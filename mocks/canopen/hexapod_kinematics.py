@@ -22,10 +22,11 @@ PARAMETERS = ("B_x", "B_y", "B_z", "P_x", "P_y", "P_z", "L0", "L_B", "L_P")
 PASSES = 40
 
 Vector = tuple[float, float, float]
-Rows = tuple[Vector, Vector, Vector]
+Turn = tuple[Vector, Vector, Vector]
+"""Rows of a rotation matrix."""
 
 
-def rotation(alpha: float, beta: float, gamma: float) -> Rows:
+def rotation(alpha: float, beta: float, gamma: float) -> Turn:
     """Return the rows of R = Rz(gamma) Ry(beta) Rx(alpha)."""
     ca, sa = math.cos(alpha), math.sin(alpha)
     cb, sb = math.cos(beta), math.sin(beta)
@@ -38,7 +39,7 @@ def rotation(alpha: float, beta: float, gamma: float) -> Rows:
 
 
 def leg_length(
-    position: Vector, rows: Rows, leg: int, values: Mapping[str, float] | Sequence[float]
+    position: Vector, rows: Turn, leg: int, values: Mapping[str, float] | Sequence[float]
 ) -> float:
     """Return the length C to D of one leg in mm.
 

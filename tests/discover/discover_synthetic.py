@@ -6,9 +6,9 @@ import numpy as np
 
 from calib.evidence import (
     Candidate,
-    Carrier,
     Diagnosis,
     LinearProblem,
+    Response,
     Variable,
     structure_candidates,
 )
@@ -57,11 +57,11 @@ class Lab:
             self.effect("drift", self.two(self.time)),
             self.cyclic(),
         ]
-        carriers = (Carrier("axes", self.two(np.ones(POSES)), size=2.0),)
+        responses = (Response("axes", self.two(np.ones(POSES)), size=2.0),)
         variables = [("x", self.x), ("y", self.y), ("time_s", self.time), ("warmth", self.warmth)]
         self.structure = structure_candidates(
-            [Variable(name, np.tile(values, 2), carriers) for name, values in variables]
-            + [Variable("time_s", np.tile(self.time, 2), carriers, ("periodic",), 0.08)]
+            [Variable(name, np.tile(values, 2), responses) for name, values in variables]
+            + [Variable("time_s", np.tile(self.time, 2), responses, ("periodic",), 0.08)]
         )
         before = np.concatenate([np.arange(POSES - 1), POSES + np.arange(POSES - 1)])
         self.quadratic = [Neighbours(before, before + 1)]

@@ -12,7 +12,7 @@ from discover_synthetic import POSES, Lab
 from app.files.runs import read_runs
 from app.verbs.compare import command
 from calib.discover.compare import compare_fit, pose_residuals
-from calib.evidence import Carrier, Variable, pure_error
+from calib.evidence import Response, Variable, pure_error
 from calib.evidence.compare import compare_structure
 from calib.formulas.effect_file import effect_from_text
 from calib.identify import fit
@@ -83,9 +83,9 @@ def test_actuator_error_put_in_is_read_off():
 def test_bins_show_the_shape_that_was_put_in():
     lab = Lab(12)
     hidden = lab.one(6.0 * np.sign(lab.warmth - np.median(lab.warmth)), 1)
-    carrier = Carrier("axes", lab.two(np.ones(POSES)), size=4.0)
+    response = Response("axes", lab.two(np.ones(POSES)), size=4.0)
     variables = [
-        Variable(name, np.tile(values, 2), (carrier,))
+        Variable(name, np.tile(values, 2), (response,))
         for name, values in (("x", lab.x), ("warmth", lab.warmth))
     ]
     problem = lab.fitted(hidden, np.random.default_rng(1))

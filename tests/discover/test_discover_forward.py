@@ -7,6 +7,7 @@ import pytest
 from discover_synthetic import Lab, Refitted
 
 from calib.evidence import diagnose, discover
+from calib.evidence.forward import speaks_against
 
 
 class Refit:
@@ -143,3 +144,19 @@ def test_refused_effect_comes_back_once_another_is_in():
     assert {first} < set(found.last.effects)
     assert found.last.effects[0] != first
     assert found.refused == ()
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "refused"),
+    [
+        (1.0, 0.9, False),
+        (1.0, 1.0, False),
+        (1.0, 1.0 + 1e-9, False),
+        (1.0, 1.001, True),
+        (1.0, np.inf, True),
+        (np.inf, np.inf, True),
+        (np.nan, np.nan, False),
+    ],
+)
+def test_held_out_poses_decide(before: float, after: float, refused: bool) -> None:
+    assert speaks_against(before, after) is refused

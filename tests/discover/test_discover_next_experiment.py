@@ -15,7 +15,7 @@ from calib.discover.design import design_follow_up
 from calib.discover.follow_up import FollowUp, own_to_each_run
 from calib.effects import effect_named
 from calib.errors import BadInput
-from calib.evidence.next_experiment import Blocks, Separation, choose_sequence
+from calib.evidence.next_experiment import CandidateBlocks, Separation, choose_sequence
 from calib.mechanism.solve import forward
 from calib.model.columns import whitened_columns
 from calib.poses.reach import sample_poses, solve_poses
@@ -50,7 +50,7 @@ def test_separation_grows_as_a_refit_would_find():
 
 def test_chosen_readings_beat_random_ones():
     rng = np.random.default_rng(6)
-    offered = [Blocks(rng.normal(size=(60, 5, 2)), rng.normal(size=(60, 2))) for _ in "ab"]
+    offered = [CandidateBlocks(rng.normal(size=(60, 5, 2)), rng.normal(size=(60, 2))) for _ in "ab"]
 
     def sides():
         return [Separation(np.eye(5), np.ones(5), np.zeros(5)) for _ in "ab"]

@@ -9,7 +9,7 @@ import pytest
 
 from app.reproduce.pose_fit import fit_poses
 from calib.arrays import Array
-from calib.mechanism.closure import Closure, State
+from calib.mechanism.closure import Closure, Standing
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.parse import parse_machine
@@ -99,7 +99,7 @@ def test_joint_angles_of_the_first_limb() -> None:
 
 def test_ranks_of_the_wrenches() -> None:
     found = at("LS", "pose")
-    state = State(found.poses.position, found.poses.rotation, found.passive, list(found.strain))
+    state = Standing.of(found)
     closure = Closure(machine("LS"), machine("LS").nominal[:, None], found.extension, state)
     rows = closure.rows()[0][:, :, 0]
     actuation, constraints = rows[:2], rows[2:]

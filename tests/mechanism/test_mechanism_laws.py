@@ -5,7 +5,7 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from calib.mechanism.closure import State, sweep
+from calib.mechanism.closure import Standing, sweep
 from calib.mechanism.compiled import compile_machine
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
@@ -42,7 +42,7 @@ def test_home_closes_at_the_stated_actuator_coordinates(machine: Machine) -> Non
 def test_every_limb_ends_at_the_platform(machine: Machine, configuration: Configuration) -> None:
     """Exactly, once the elastic strains are taken as joints."""
     poses = configuration.poses
-    state = State(poses.position, poses.rotation, configuration.passive, list(configuration.strain))
+    state = Standing.of(configuration)
     for g, group in enumerate(compile_machine(machine).groups):
         point, rotation, _ = sweep(
             group,
