@@ -1,6 +1,6 @@
 """The two axes of a universal joint do not meet: for machine files that let them meet.
 
-A leg of length l stands between C = B + L_B n_B and D = P + L_P n_P (notes.md section 1), while
+A leg of length l stands between C = B + L_B n_B and D = P + L_P n_P (docs/papers.md), while
 the file puts it between B and P. At the same pose the file's leg is longer by |P - B| - |D - C|,
 which with a = D - C, b = L_B n_B - L_P n_P equals b . (2 a + b) / (|a + b| + |a|): exact, and
 linear in L_B and L_P once the directions are known. n_B is the direction of D - B in the plane

@@ -1,8 +1,8 @@
 """The first axis of a universal joint points off its nominal direction.
 
 The joint's frame is turned by small angles about its local y and z; about x nothing changes. The
-leg is a pure force along u from C to D (notes.md section 1: the leg lies in the plane of the
-joint's first axis and its arm), so at fixed pose the turn e moves C by e x (C - B), which acts
+leg is a pure force along u from C to D (docs/papers.md: it lies in the plane of the joint's
+first axis and its arm), so at fixed pose the turn e moves C by e x (C - B), which acts
 like an extension +u . (e x (C - B)); on the platform it moves D and acts like -u . (e x (D - P)).
 """
 

@@ -1,4 +1,4 @@
-"""Effects of over-constrained tracking mechanisms (Zhang et al. 2018; notes.md section 3)."""
+"""Effects of over-constrained tracking mechanisms (Zhang et al. 2018; docs/papers.md)."""
 
 from collections.abc import Iterator
 from functools import lru_cache

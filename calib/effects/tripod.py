@@ -1,4 +1,4 @@
-"""Effects of the tripod, through its elastic closure (Feng et al. 2022; notes.md section 2).
+"""Effects of the tripod, through its elastic closure (Feng et al. 2022; docs/papers.md).
 
 Effects of geometry move the platform by the twists of error sources that the machine file describes
 in detail. Under its weight the platform gives way by the compliance of the closure itself: the long

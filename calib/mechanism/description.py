@@ -3,7 +3,7 @@
 An element is a translation along, or a rotation about, one local axis. Its value is a linear map
 of *variables*: a constant, named parameters (geometry), actuators (extension s) and passive
 joints. A parameter is thus a locked joint: its error twist is the column that a joint would have
-at that place (seeds: one Newton step of the closure is the linear error model).
+at that place (docs/derivation.md: one Newton step of the closure is the linear error model).
 """
 
 from collections.abc import Mapping

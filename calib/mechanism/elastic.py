@@ -2,7 +2,7 @@
 
 A limb that is moved by ``twist`` along its wrenches W carries the wrench W lambda with
 G lambda = W^T twist, G = W^T C W, C the compliances of its elements. With G = L L^T the rows
-L^-1 W^T make plain least squares the elastic equilibrium of all limbs (engine: whitening).
+L^-1 W^T make plain least squares the elastic equilibrium of all limbs (docs/derivation.md).
 A released limb keeps only the rows on which its actuators work; rows with published weights are
 unit forces (Zhang et al. 2018, eq. 20).
 

@@ -2,7 +2,7 @@
 
 A rotation is an array (3, 3, ...) with ``R[i, j]`` row i, column j; a vector is (3, ...). All
 functions are analytic in the sense of complex step: no conjugate, no absolute value.
-R = Rz(rz) Ry(ry) Rx(rx) throughout (seeds/notes section 1).
+R = Rz(rz) Ry(ry) Rx(rx) throughout.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The hexapod's closed form (Han et al. 2020, as corrected in the reading notes, section 1).
+"""The hexapod's closed form (Han et al. 2020, put right in docs/papers.md).
 
 Limb i has fixed joint frames FB = Rz(phi_b), FP = Rz(phi_p) with columns x, y, z::
 

@@ -2,7 +2,7 @@
 
 Six long sides alone leave the rotation about O O' free. The hinges keep the lower short side in
 the plane of its parallelogram; they are kappa c^2 times as stiff, per limb, as a long side is
-(notes.md, section 2). The platform rests where
+(docs/papers.md). The platform rests where
 
     sum over sides (|w| - h)^2 + (kappa / 2) c^2 phi^2
 

@@ -1,4 +1,4 @@
-"""Geometry of the over-constrained tracking mechanism (Zhang et al. 2018; notes.md, section 3).
+"""Geometry of the over-constrained tracking mechanism (Zhang et al. 2018; docs/papers.md).
 
 Four limbs of two links stand at 90 deg around the base: R joint, lower link, S joint, upper link,
 R joint. A rod between two S joints stands in the middle. Home: the platform is the mirror image of

@@ -1,4 +1,4 @@
-"""The tripod's closed form (Feng et al. 2022, as corrected in the reading notes, section 2).
+"""The tripod's closed form (Feng et al. 2022, put right in docs/papers.md).
 
 With o_i = (cos theta_i, sin theta_i, 0), sliders at l_i o_i and platform joints at b o_i from O'::
 

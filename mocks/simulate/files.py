@@ -1,4 +1,4 @@
-"""A simulated campaign as files: run.toml, points.csv (formats.md of the project) and truth."""
+"""A simulated campaign as files: run.toml, points.csv, and apart from them the truth."""
 
 import json
 from pathlib import Path

@@ -63,7 +63,7 @@ def test_relations_say_what_looks_alike() -> None:
         expected = sum(factor * column[other] for other, factor in relation.like)
         size = np.linalg.norm(column[relation.name])
         assert np.linalg.norm(column[relation.name] - expected) < 1e-6 * max(size, 1e-9)
-    # notes.md section 3: dtheta_i = L (cos theta_L 1dx2 + sin theta_L 1dy2), exactly.
+    # docs/papers.md: dtheta_i = L (cos theta_L 1dx2 + sin theta_L 1dy2), exactly.
     group = next(g for g in found.exact_groups if "limb1.dtheta" in g)
     assert set(group) == {"limb1.dtheta", "limb1.1dx2", "limb1.1dy2"}
 
@@ -140,7 +140,7 @@ def test_a_translational_machine_cannot_tell_tool_offset_from_frame_origin() -> 
 
 
 def test_tripod_ranks_with_positions_only() -> None:
-    # notes.md section 2: 9 of 9; the base frame's yaw is a common theta, so 14 of 15.
+    # docs/papers.md: 9 of 9; the base frame's yaw is a common theta, so 14 of 15.
     machine = load_machine("tripod")
     poses = workspace_poses(machine, 60, np.random.default_rng(1))
     point = PoseNoise(0.01, None)

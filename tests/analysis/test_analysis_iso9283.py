@@ -110,7 +110,7 @@ def test_fengs_pose_accuracies_are_the_norms_of_their_components() -> None:
 
 
 def test_fengs_distance_repeatability_is_46_times_what_his_rp_allows() -> None:
-    # notes.md section 2: "RD of Table 8 ... 46x what RP allows: not an ISO 9283 repeatability".
+    # docs/papers.md: it mixes poses, and is no repeatability of ISO 9283.
     allowed = [implied_distance_repeatability(rp.mean(), rp.mean()) for rp in FENG_RP]
     assert FENG_RD[0] / allowed[0] == pytest.approx(46.0, abs=0.5)
     assert FENG_RD[1] / allowed[1] > 15.0

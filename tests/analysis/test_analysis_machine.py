@@ -52,8 +52,8 @@ def test_inspection_numbers(name: str, redundant: int, mobility: int, rank: int)
     assert found.home_gap_mm < 1e-3
 
 
-def test_hexapod_reach_is_that_of_the_notes() -> None:
-    # notes.md section 1: 44 % of random poses of Table 3's box are reachable.
+def test_hexapod_reach_of_the_box_of_table_3() -> None:
+    # docs/papers.md: 44 % of random poses of Table 3's box are reachable.
     found = inspect(load_machine("hexapod"), np.random.default_rng(1))
     assert found.reach == pytest.approx(0.44, abs=0.04)
     assert {stop.what for stop in found.stops} == {f"q{i}" for i in range(1, 7)}

@@ -34,7 +34,7 @@ def test_local_index_is_how_far_a_small_error_moves_the_pose(name: str) -> None:
 
 
 def test_ptm_indices_of_zhang_over_217_poses() -> None:
-    # notes.md section 3: LS, limbs 1 and 2, mm and deg per mm or deg.
+    # LS, limbs 1 and 2, mm and deg per mm or deg.
     machine = with_closure(load_machine("ptm"), "LS")
     found = sensitivity(workspace_poses(machine, 1, np.random.default_rng(0)))
     assert found.poses == 217

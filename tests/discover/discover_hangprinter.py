@@ -1,4 +1,4 @@
-"""The Hangprinter, a four-line parallel robot: 44 poses, of which 9 are known (data/README.md).
+"""The Hangprinter, a four-line robot: 44 poses, of which 9 are known (tests/data/real/README.md).
 
 Unknown are four anchors, spool radii, and where the machine stood at the other 35 poses. Rows are
 line lengths in the order pose, line (A B C D).

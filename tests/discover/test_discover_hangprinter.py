@@ -1,4 +1,4 @@
-"""The Hangprinter: accept build-up of line on the spools, refuse line flex (data/README.md)."""
+"""The Hangprinter: accept build-up on the spools, not line flex (tests/data/real/README.md)."""
 
 import discover_hangprinter as hp
 import numpy as np

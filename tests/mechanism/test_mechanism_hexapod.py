@@ -12,7 +12,7 @@ from tests.mechanism.conftest import load, manufactured, reachable
 
 
 def closed_form_length(machine: Machine, pose: np.ndarray, leg: int) -> float:
-    """Leg length by the closed equations (seeds, section 1), psi solved by Newton."""
+    """Leg length by the closed equations (docs/papers.md), psi solved by Newton."""
     values = {p.name: p.nominal for p in machine.parameters}
     get = lambda key: values[f"leg{leg}.{key}"]  # noqa: E731
     phi_b = np.radians([15, 105, 135, 225, 255, 345][leg - 1])
@@ -101,7 +101,7 @@ def test_length_derivatives_of_the_envelope_theorem(hexapod: Machine) -> None:
 
 
 def test_exact_ranks_over_poses(hexapod: Machine) -> None:
-    """54 of 54 with known nests; a free base frame leaves 57 of 60 (seeds, section 1)."""
+    """54 of 54 with known nests; a free base frame leaves 57 of 60 (docs/papers.md)."""
     configuration = reachable(hexapod, 40, seed=9)
     J = pose_jacobians(hexapod, configuration).parameters.reshape(54, -1).T
     assert np.linalg.matrix_rank(J, tol=1e-6 * np.linalg.norm(J, 2)) == 54

@@ -1,4 +1,4 @@
-"""The mock's closed form: the notes' numbers and the laws of kinematics."""
+"""The mock's closed form: numbers of docs/papers.md and the laws of kinematics."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The tracking mechanism's own physics: the notes' numbers, laws, and the engine beside it."""
+"""The tracking mechanism's own physics: numbers of docs/papers.md, laws, the engine beside it."""
 
 from functools import cache
 

@@ -1,4 +1,4 @@
-"""The tripod's own physics: laws, the notes' home, and the engine beside it."""
+"""The tripod's own physics: laws, the home of docs/papers.md, and the engine beside it."""
 
 import numpy as np
 import pytest
