@@ -163,7 +163,8 @@ def _serial(nvm: Path | None) -> int:
     return int(label.read_text(encoding="ascii"))
 
 
-def _arguments(argv: list[str] | None) -> argparse.Namespace:
+def parser() -> argparse.ArgumentParser:
+    """What ``pkmcal mock`` understands."""
     parser = argparse.ArgumentParser(
         prog="pkmcal mock",
         description=__doc__,
@@ -184,7 +185,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
         parser.add_argument(f"--{name}-port", type=int, default=0)
     parser.add_argument("--site", type=Path, help="write a site file here")
     parser.add_argument("--until-stdin-closes", action="store_true", help="end with the parent")
-    return parser.parse_args(argv)
+    return parser
 
 
 def build(options: argparse.Namespace) -> MockStation:
@@ -252,7 +253,7 @@ def _watch_stdin(end: Callable[[], None]) -> None:
 
 def main(argv: list[str] | None = None) -> int:
     """Run a station; exit code 2 for bad input, 3 if a port is taken."""
-    options = _arguments(argv)
+    options = parser().parse_args(argv)
     try:
         asyncio.run(run(options))
     except ValueError as error:

@@ -25,12 +25,11 @@ async def reverify(work: Work) -> None:
         If that is the operator's answer.
     """
     work.memory.verified = True
-    last = work.last_references()
-    if not (work.site.hands.base_smrs and last):
+    if not (work.site.hands.base_smrs and work.memory.last_reference):
         return
-    reference = next(iter(last))
+    reference = next(iter(work.memory.last_reference))
     reading, _ = await measured(work, reference, _LOOK_S)
-    before = np.array(last[reference])
+    before = np.array(work.memory.last_reference[reference])
     shift = float(np.linalg.norm(np.array(reading.xyz) - before))
     work.memory.aimed_at = ""
     if shift <= work.limits.drift_mm:
