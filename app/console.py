@@ -14,10 +14,8 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemaining
 
 from app.answer import interactive
 from app.session import events as ev
+from app.session.kinds import KINDS
 from app.session.session import Outcome, Session
-
-_OFTEN = {"read", "move", "truth", "home"}
-"""Kinds of steps that are too many to be told one by one."""
 
 
 class ConsoleFace:
@@ -25,6 +23,8 @@ class ConsoleFace:
 
     def __init__(self, answer: Callable[[str, str], None], total: int, *, quiet: bool) -> None:
         self._answer = answer
+        self._often = False
+        """Whether the step in work is of a kind that is too frequent to tell each end."""
         self._console = Console(stderr=True, quiet=quiet, highlight=False, soft_wrap=True)
         self._progress = Progress(
             TextColumn("{task.completed:.0f}/{task.total:.0f}"),
@@ -47,7 +47,8 @@ class ConsoleFace:
     def hear(self, event: ev.Event) -> None:
         """Take one event."""
         match event:
-            case ev.StepStarted(says=says):
+            case ev.StepStarted(says=says, kind=kind):
+                self._often = KINDS[kind].often
                 self._progress.update(self._task, description=says)
             case ev.Progress(done=done, total=total):
                 self._progress.update(self._task, completed=done, total=total)
@@ -55,6 +56,8 @@ class ConsoleFace:
                 asking = asyncio.create_task(self._ask(event))
                 self._asking.add(asking)
                 asking.add_done_callback(self._asking.discard)
+            case ev.StepDone() if self._often:
+                pass
             case _:
                 words = _words(event)
                 if words:
@@ -112,7 +115,7 @@ def _words(event: ev.Event) -> str:
             return f"going on: {why}"
         case ev.ReadingRejected(pose_label=pose, nest=nest, why=why):
             return f"reading of nest {nest} at pose {pose or 'home'} set aside: {why}"
-        case ev.StepDone(summary=summary, step=step) if not _OFTEN & set(step.split("-")):
+        case ev.StepDone(summary=summary, step=step):
             return f"  {step}: {summary}"
         case ev.GateChecked(passed=passed, says=says):
             return f"  {'passed ' if passed else 'REFUSED'} {says}"

@@ -18,7 +18,8 @@ import numpy as np
 from app.files.machines import read_text
 from app.files.pose_table import Pose
 from app.files.site import Site, load_site
-from app.session.journal import Journal, Row
+from app.session.journal import PARAMETERS, PLANNED, Journal, Row
+from app.session.kinds import TRUTH
 from app.session.plan import Plan
 from app.session.plans import PlanOptions, measure_plan, order_for
 from calib.arrays import Array
@@ -151,7 +152,7 @@ def _wanted(site: Site, plan: Plan, journal: Journal, labels: tuple[str, ...]) -
     machine = site.machine
     if machine.task.coordinates == FULL:
         return [Frame.of(plan.poses[label]) for label in labels]
-    held: dict[str, float] = journal.meta("controller_parameters", {})
+    held: dict[str, float] = journal.meta(PARAMETERS, {})
     known = {name: v for name, v in held.items() if name in machine.parameter_index}
     target = Poses.from_xyz_rpy(np.array([plan.poses[label] for label in labels]).T)
     poses = inverse(machine, target, machine.vector(known)).poses
@@ -189,8 +190,9 @@ def _truth(
     states = journal.states()
     true: dict[str, Frame] = {}
     for step in plan.steps:
-        if step.kind == "truth" and step.id in states and states[step.id].state == "done":
-            result = states[step.id].result
+        state = states.get(step.id, PLANNED)
+        if step.kind is TRUTH and state.state == "done":
+            result = state.result
             true[result["pose"]] = Frame(np.array(result["rotation"]), np.array(result["position"]))
     if not all(label in true for label in labels):
         return None, None

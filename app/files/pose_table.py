@@ -20,6 +20,9 @@ from calib.errors import BadInput
 Pose = tuple[float, float, float, float, float, float]
 """x, y, z in mm and rx, ry, rz in rad: the platform in the base frame."""
 
+HOME = "home"
+"""Label of the machine's own home pose; no pose of a file may have it."""
+
 COLUMNS = ("pose", "x", "y", "z", "rx", "ry", "rz")
 
 
@@ -46,7 +49,7 @@ def read_poses(path: Path) -> dict[str, Pose]:
         if len(row) != len(COLUMNS):
             raise BadInput(f"{len(row)} columns, not {len(COLUMNS)}", place=place)
         label = row[0].strip()
-        if not label or label == "home" or label in poses:
+        if not label or label == HOME or label in poses:
             raise BadInput(
                 f'label "{label}" is empty, reserved or there already',
                 place=f"{place}, column pose",

@@ -10,7 +10,7 @@ from typing import Any
 import tomli_w
 
 from app.files.site import Site
-from app.session.journal import Journal, Row
+from app.session.journal import PARAMETERS, Journal, Row
 from app.session.plan import Plan
 
 _SAME = 1e-9
@@ -36,7 +36,7 @@ def _replace(path: Path, text: str) -> None:
 
 
 def _header(site: Site, plan: Plan, journal: Journal) -> dict[str, Any]:
-    held: dict[str, float] = journal.meta("controller_parameters", {})
+    held: dict[str, float] = journal.meta(PARAMETERS, {})
     known = site.machine.parameter_index
     header: dict[str, Any] = {
         "format": "pkm-run/1",

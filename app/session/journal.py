@@ -8,12 +8,14 @@ reason.
 
 import json
 import sqlite3
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
+from app.session.kinds import KINDS
 from app.session.plan import Plan
 from calib.errors import BadInput
 
@@ -39,16 +41,28 @@ CREATE TABLE IF NOT EXISTS notes (
     kind TEXT NOT NULL, text TEXT NOT NULL);
 """
 
+PARAMETERS, SMRS = "controller_parameters", "smrs"
+"""Facts about a session: what the controller held at connect, nest of each SMR by its number."""
 PENDING = ("planned", "started", "failed")
+_GOOD_READING = "kind = 'reading' AND status = 'good'"
 
 
 @dataclass(frozen=True)
 class StepState:
-    """Where a step is: its last log entry."""
+    """Where a step is: its last log entry, whose number is ``entry`` (0: there is none)."""
 
     state: str
     attempt: int
     result: Mapping[str, Any]
+    entry: int = 0
+
+    @property
+    def pending(self) -> bool:
+        """Whether the step is still to be done."""
+        return self.state in PENDING
+
+
+PLANNED = StepState("planned", 0, {})
 
 
 @dataclass(frozen=True)
@@ -109,6 +123,8 @@ class Journal:
         except sqlite3.DatabaseError as error:
             self._db.close()
             raise BadInput(f"not a journal of this program ({error})", place=str(path)) from error
+        self._states: dict[str, StepState] = {}
+        self._seen = 0
 
     def close(self) -> None:
         """Close the database."""
@@ -151,19 +167,33 @@ class Journal:
         with self._transaction():
             self._db.executemany(
                 "INSERT INTO steps VALUES (?, ?, ?)",
-                [(step.id, position, step.kind) for position, step in enumerate(plan.steps)],
+                [(step.id, position, step.kind.name) for position, step in enumerate(plan.steps)],
             )
 
-    def states(self) -> dict[str, StepState]:
-        """State of every step that has a log entry."""
+    def states(self) -> Mapping[str, StepState]:
+        """State of every step that has a log entry, as the log says at this moment.
+
+        Entries are only ever added, so what was read before is not read again.
+        """
         rows = self._db.execute(
-            "SELECT step, state, attempt, result FROM log WHERE seq IN "
-            "(SELECT max(seq) FROM log GROUP BY step)"
+            "SELECT seq, step, state, attempt, result FROM log WHERE seq > ? ORDER BY seq",
+            (self._seen,),
         )
-        return {
-            row["step"]: StepState(row["state"], row["attempt"], json.loads(row["result"]))
-            for row in rows
-        }
+        for row in rows:
+            self._seen = row["seq"]
+            self._states[row["step"]] = StepState(
+                row["state"], row["attempt"], json.loads(row["result"]), row["seq"]
+            )
+        return MappingProxyType(self._states)
+
+    def state(self, step: str) -> StepState:
+        """State of one step."""
+        return self.states().get(step, PLANNED)
+
+    def last_entry(self) -> int:
+        """Number of the last log entry; 0 before the first."""
+        row = self._db.execute("SELECT max(seq) AS seq FROM log").fetchone()
+        return int(row["seq"] or 0)
 
     def started(self, step: str, attempt: int, time_s: float, utc: str) -> None:
         """Write that a step begins."""
@@ -227,6 +257,23 @@ class Journal:
         where = "WHERE status = 'good'" if good_only else ""
         return [_row(row) for row in self._db.execute(f"SELECT * FROM rows {where} ORDER BY seq")]
 
+    def readings(self) -> int:
+        """Count the good readings."""
+        row = self._db.execute(f"SELECT count(*) AS n FROM rows WHERE {_GOOD_READING}").fetchone()
+        return int(row["n"])
+
+    def seen(self, nests: Iterable[str]) -> dict[str, list[tuple[float, float, float]]]:
+        """Good readings (tracker frame, mm) of each of these nests that was read, in order."""
+        wanted = set(nests)
+        found: dict[str, list[tuple[float, float, float]]] = {}
+        for row in self._db.execute(
+            f"SELECT nest, xyz FROM rows WHERE {_GOOD_READING} AND xyz IS NOT NULL ORDER BY seq"
+        ):
+            if row["nest"] in wanted:
+                x, y, z = json.loads(row["xyz"])
+                found.setdefault(row["nest"], []).append((x, y, z))
+        return found
+
     def last_row(self) -> Row | None:
         """The last move or reading, whatever became of it."""
         row = self._db.execute("SELECT * FROM rows ORDER BY seq DESC LIMIT 1").fetchone()
@@ -242,19 +289,18 @@ class Journal:
 
     def invalidate(self, why: str, time_s: float, utc: str) -> None:
         """Set every good reading aside, and let all steps that rest on readings be done again."""
+        kinds = {row["id"]: row["kind"] for row in self._db.execute("SELECT id, kind FROM steps")}
+        again = {
+            step: state.attempt
+            for step, state in self.states().items()
+            if state.state == "done" and KINDS[kinds[step]].rests_on_readings
+        }
         with self._transaction():
             self._db.execute(
-                "UPDATE rows SET status = 'invalidated', why = ? "
-                "WHERE kind = 'reading' AND status = 'good'",
-                (why,),
+                f"UPDATE rows SET status = 'invalidated', why = ? WHERE {_GOOD_READING}", (why,)
             )
-            found = self._db.execute(
-                "SELECT s.id, l.attempt FROM steps s JOIN log l ON l.step = s.id "
-                "WHERE s.kind IN ('read', 'reference', 'drift') "
-                "AND l.seq IN (SELECT max(seq) FROM log GROUP BY step) AND l.state = 'done'"
-            ).fetchall()
-            for row in found:
-                self._log(row["id"], "failed", row["attempt"], time_s, utc, {"what": why})
+            for step, attempt in again.items():
+                self._log(step, "failed", attempt, time_s, utc, {"what": why})
 
     # notes
 

@@ -5,9 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from app.errors import GateRefused
-from app.files.pose_table import Pose
+from app.files.pose_table import HOME, Pose
 from app.session.plan import Plan
-from app.session.work import HOME
 from calib.mechanism.description import Machine
 from calib.mechanism.limits import Violation, violations
 from calib.mechanism.rigid import Poses
@@ -21,10 +20,8 @@ def waypoints(plan: Plan) -> list[str]:
     """Labels of the poses in the order in which the plan goes to them, home first."""
     path = [HOME]
     for step in plan.steps:
-        label = step.args["pose"] if step.kind in ("move", "read") else None
-        label = HOME if step.kind in ("home", "confirm") else label
-        if label is not None and label != path[-1]:
-            path.append(label)
+        if step.goal is not None and step.goal != path[-1]:
+            path.append(step.goal)
     return path
 
 

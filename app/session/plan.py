@@ -6,10 +6,11 @@ and so that a killed session goes on with exactly the steps that it began.
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
-from app.files.pose_table import Pose
+from app.files.pose_table import HOME, Pose
+from app.session.kinds import StepKind, kind_named
 from calib.errors import BadInput
 
 FORMAT = "pkm-plan/1"
@@ -17,15 +18,22 @@ FORMAT = "pkm-plan/1"
 
 @dataclass(frozen=True)
 class Step:
-    """One step: ``kind`` names the routine that does it, ``args`` is all that it needs to know.
+    """One step: ``kind`` decides which routine does it, ``args`` is all that it needs to know.
 
     ``id`` is stable: number in the plan and what it is about, ``"0042-read-p07-4"``.
     """
 
     id: str
-    kind: str
+    kind: StepKind
     says: str
     args: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def goal(self) -> str | None:
+        """Label of the pose where the machine stands after it; None where it moves nothing."""
+        if self.kind.moves_to == "pose":
+            return str(self.args["pose"])
+        return HOME if self.kind.moves_to == "home" else None
 
 
 @dataclass(frozen=True)
@@ -42,12 +50,13 @@ class Plan:
     steps: tuple[Step, ...]
 
     def to_json(self) -> str:
-        """Render the plan as JSON text."""
-        return json.dumps({"format": FORMAT, **asdict(self)}, indent=1)
+        """Render the plan as JSON text; a kind is written as its word."""
+        steps = [{**vars(step), "kind": step.kind.name} for step in self.steps]
+        return json.dumps({"format": FORMAT, **vars(self), "steps": steps}, indent=1)
 
     @staticmethod
     def from_json(text: str, source: str) -> "Plan":
-        """Read a plan back; raises :class:`BadInput` if the text is not one."""
+        """Read a plan back; raises :class:`BadInput` if it is none, or has steps unknown here."""
         try:
             data = json.loads(text)
             if data["format"] != FORMAT:
@@ -57,7 +66,7 @@ class Plan:
                 title=data["title"],
                 machine=data["machine"],
                 poses={label: _pose(pose) for label, pose in data["poses"].items()},
-                steps=tuple(Step(**step) for step in data["steps"]),
+                steps=tuple(_step(step, source) for step in data["steps"]),
             )
         except (ValueError, KeyError, TypeError) as error:
             raise BadInput(
@@ -71,11 +80,18 @@ class PlanWriter:
     def __init__(self) -> None:
         self.steps: list[Step] = []
 
-    def add(self, kind: str, about: str, says: str, **args: Any) -> None:
-        """Append a step; ``about`` goes into its identifier."""
+    def add(self, kind: StepKind, about: str = "", says: str = "", **args: Any) -> None:
+        """Append a step; ``about`` goes into its identifier, ``says`` replaces its kind's words."""
         number = f"{len(self.steps) + 1:04d}"
-        parts = [number, kind, about] if about else [number, kind]
-        self.steps.append(Step("-".join(parts), kind, says, args))
+        parts = [number, kind.name, about] if about else [number, kind.name]
+        words = says or kind.words.format(**args)
+        self.steps.append(Step("-".join(parts), kind, words, args))
+
+
+def _step(stored: Mapping[str, Any], source: str) -> Step:
+    step = Step(**{**stored, "kind": kind_named(stored["kind"], source)})
+    _ = step.goal  # a step that moves to a pose says to which
+    return step
 
 
 def _pose(values: Any) -> Pose:

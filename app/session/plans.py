@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from app.files.pose_table import Pose
 from app.files.site import Site
+from app.session import kinds
 from app.session.plan import Plan, PlanWriter
 from calib.errors import BadInput
 
@@ -59,36 +60,36 @@ def measure_plan(
     _prepare(plan, options)
     _reference(plan, site, "start")
     if options.two_face:
-        plan.add("two-face", "start", "two-face check of the tracker")
+        plan.add(kinds.TWO_FACE, "start")
     if options.order == "nest-by-nest":
         _nest_by_nest(plan, site, poses, options)
     else:
         _pose_by_pose(plan, site, poses, options)
-    plan.add("home", "end", "return to the home pose")
+    plan.add(kinds.HOME, "end", "return to the home pose")
     _reference(plan, site, "end")
     if options.two_face:
-        plan.add("two-face", "end", "two-face check of the tracker")
-    plan.add("rest", "", "take the power off the drives")
+        plan.add(kinds.TWO_FACE, "end")
+    plan.add(kinds.REST)
     title = options.title or f"{site.machine.name}, {len(poses)} poses, {len(nests)} nests"
     return Plan(purpose, title, site.machine_name, dict(poses), tuple(plan.steps))
 
 
 def _prepare(plan: PlanWriter, options: PlanOptions) -> None:
-    plan.add("connect", "", "identities and the controller's parameters")
-    plan.add("check-path", "", "the whole path against all limits")
-    plan.add("tracker", "", "initialise the tracker, choose the reflector")
-    plan.add("drives", "", "drives on")
+    plan.add(kinds.CONNECT)
+    plan.add(kinds.CHECK_PATH)
+    plan.add(kinds.TRACKER)
+    plan.add(kinds.DRIVES)
     if options.warm_up:
-        plan.add("warm-up", "", "wait until laser and machine are warm and steady")
-    plan.add("home", "start", "go to the home pose")
+        plan.add(kinds.WARM_UP)
+    plan.add(kinds.HOME, "start")
 
 
 def _reference(plan: PlanWriter, site: Site, about: str) -> None:
     """Read every base nest, then judge the drift (or find the base frame, the first time)."""
     for nest in site.base_nests:
-        plan.add("reference", f"{about}-{nest}", f"reference nest {nest} on the base", nest=nest)
-    says = "find the base in the tracker's frame" if about == "start" else "drift of the base"
-    plan.add("drift", about, says, nests=list(site.base_nests), group=about)
+        plan.add(kinds.REFERENCE, f"{about}-{nest}", nest=nest)
+    says = "find the base in the tracker's frame" if about == "start" else ""
+    plan.add(kinds.DRIFT, about, says, nests=list(site.base_nests), group=about)
 
 
 def _nest_by_nest(
@@ -96,14 +97,14 @@ def _nest_by_nest(
 ) -> None:
     visited = 0
     for nest in _nests(site, options):
-        plan.add("home", f"nest-{nest}", "home, for the SMR to be carried")
-        plan.add("carry", nest, f"SMR into nest {nest}", nest=nest, smr=1)
-        plan.add("confirm", nest, f"is it nest {nest} that the tracker sees?", nest=nest)
+        plan.add(kinds.HOME, f"nest-{nest}", "home, for the SMR to be carried")
+        plan.add(kinds.CARRY, nest, f"SMR into nest {nest}", nest=nest, smr=1)
+        plan.add(kinds.CONFIRM, nest, nest=nest)
         for cycle in range(1, options.cycles + 1):
             for label in poses:
                 if visited and visited % options.reference_every == 0:
                     _reference(plan, site, f"after-{visited}")
-                plan.add("move", f"{label}-{nest}", f"move to pose {label}", pose=label)
+                plan.add(kinds.MOVE, f"{label}-{nest}", pose=label)
                 _read(plan, label, nest, cycle, options)
                 visited += 1
 
@@ -112,22 +113,22 @@ def _pose_by_pose(
     plan: PlanWriter, site: Site, poses: Mapping[str, Pose], options: PlanOptions
 ) -> None:
     nests = _nests(site, options)
-    plan.add("home", "carry", "home, for the SMRs to be carried")
+    plan.add(kinds.HOME, "carry", "home, for the SMRs to be carried")
     for smr, nest in enumerate(nests, start=1):
-        plan.add("carry", nest, f"SMR {smr} into nest {nest}", nest=nest, smr=smr)
+        plan.add(kinds.CARRY, nest, nest=nest, smr=smr)
     for nest in nests:
-        plan.add("confirm", nest, f"is it nest {nest} that the tracker sees?", nest=nest)
+        plan.add(kinds.CONFIRM, nest, nest=nest)
     visited = 0
     for cycle in range(1, options.cycles + 1):
         for label in poses:
             if visited and visited % options.reference_every == 0:
                 _reference(plan, site, f"after-{visited}")
-            plan.add("move", label, f"move to pose {label}", pose=label)
+            plan.add(kinds.MOVE, label, pose=label)
             # Back and forth: the beam is already on the nest that was read last.
             for nest in nests if visited % 2 == 0 else reversed(nests):
                 _read(plan, label, nest, cycle, options)
             if options.truth:
-                plan.add("truth", label, f"the mock's true pose at {label}", pose=label)
+                plan.add(kinds.TRUTH, label, pose=label)
             visited += 1
 
 
@@ -146,8 +147,8 @@ def order_for(site: Site) -> Order:
 
 
 def _read(plan: PlanWriter, label: str, nest: str, cycle: int, options: PlanOptions) -> None:
-    args = {"cycle": cycle} if options.cycles > 1 else {}
-    plan.add("read", f"{label}-{nest}", f"read nest {nest}", pose=label, nest=nest, **args)
+    args: dict[str, Any] = {"cycle": cycle} if options.cycles > 1 else {}
+    plan.add(kinds.READ, f"{label}-{nest}", pose=label, nest=nest, **args)
 
 
 def pose_labels(poses: Sequence[Pose]) -> dict[str, Pose]:

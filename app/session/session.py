@@ -38,10 +38,10 @@ from app.session.events import (
 )
 from app.session.export import export_run
 from app.session.folder import JOURNAL, RUN, make_folder, read_folder
-from app.session.journal import PENDING, Journal, StepState
+from app.session.journal import PLANNED, Journal, StepState
 from app.session.plan import Plan, Step
 from app.session.recall import recall
-from app.session.routines import EVERY_TIME, NEVER_SKIPPED, ROUTINES
+from app.session.routines import ROUTINES
 from app.session.station import Station
 from app.session.work import Done, StartOver, Work
 from calib.errors import BadInput
@@ -49,7 +49,6 @@ from drivers.errors import DeviceError
 from drivers.interface import Alarm
 
 _WATCH_S = 0.1
-_NOT_YET = StepState("planned", 0, {})
 
 
 @dataclass(frozen=True)
@@ -83,8 +82,7 @@ class Session:
         self.station = station
         self.journal = journal
         self.work = Work(station, plan, journal, unattended=unattended, expected=expected)
-        self._states = journal.states()
-        self._again = {s.id for s in plan.steps if s.kind in EVERY_TIME and s.id in self._states}
+        self._taken_over_at = journal.last_entry()
         self._going = asyncio.Event()
         self._going.set()
         self._driving: asyncio.Task[None] | None = None
@@ -144,7 +142,20 @@ class Session:
 
     def steps(self) -> Sequence[tuple[Step, StepState]]:
         """Every step with its state, for a list on a screen."""
-        return [(step, self._states.get(step.id, _NOT_YET)) for step in self.plan.steps]
+        states = self.journal.states()
+        return [(step, states.get(step.id, PLANNED)) for step in self.plan.steps]
+
+    def due(self) -> list[Step]:
+        """The steps that are still to be done, in order.
+
+        By the journal: those that did not end well or were not begun, and those that are done
+        every time and were last done before this session was taken over.
+        """
+        return [
+            step
+            for step, state in self.steps()
+            if state.pending or (step.kind.every_time and state.entry <= self._taken_over_at)
+        ]
 
     # the operator's keys
 
@@ -180,7 +191,7 @@ class Session:
         step = next((s for s in self.plan.steps if s.id == self.work.step), None)
         if self._step_task is None or step is None:
             raise GateRefused("no step is in work", remedy="Skip while a step runs")
-        if step.kind in NEVER_SKIPPED:
+        if not step.kind.skippable:
             raise GateRefused(f"{step.says}: cannot be skipped", remedy="Stop instead")
         self._skip_why = why
         self._step_task.cancel()
@@ -253,7 +264,7 @@ class Session:
             await self._end(watch)
             leave()
             self._driving = None
-            if self.work.readings:
+            if self.journal.readings():
                 # Also of a session that ended early: what was read is of use already.
                 export_run(self.work.site, self.plan, self.journal, self.folder / RUN)
         return self._finish()
@@ -261,34 +272,27 @@ class Session:
     async def _drive(self) -> None:
         begun = asyncio.get_running_loop().time()
         at_start = self._done_count()
-        while (found := self._next()) is not None:
-            index, step = found
+        while due := self.due():
             await self._going.wait()
-            await self._do(index, step)
+            await self._do(self.plan.steps.index(due[0]), due[0])
             done = self._done_count()
             spent = asyncio.get_running_loop().time() - begun
             rate = (done - at_start) / spent if spent > 0.0 else 0.0
             left = (len(self.plan.steps) - done) / rate if rate > 0.0 else None
             self.observers.tell(Progress(done, len(self.plan.steps), left))
 
-    def _next(self) -> tuple[int, Step] | None:
-        for index, step in enumerate(self.plan.steps):
-            state = self._states.get(step.id, _NOT_YET)
-            if state.state in PENDING or step.id in self._again:
-                return index, step
-        return None
-
     def _done_count(self) -> int:
-        return sum(state.state not in PENDING for state in self._states.values())
+        return sum(not state.pending for state in self.journal.states().values())
 
     async def _do(self, index: int, step: Step) -> None:
         """Do one step: started, then done with its reading, failed, or skipped."""
-        attempt = self._states.get(step.id, _NOT_YET).attempt + 1
+        attempt = self.journal.state(step.id).attempt + 1
         self.work.step, self.work.attempt = step.id, attempt
         clock = self.station.clock
         self.journal.started(step.id, attempt, clock.now(), clock.utc())
-        self._states[step.id] = StepState("started", attempt, {})
-        self.observers.tell(StepStarted(step.id, index, step.kind, step.says, attempt, clock.now()))
+        self.observers.tell(
+            StepStarted(step.id, index, step.kind.name, step.says, attempt, clock.now())
+        )
         self._skip_why = None
         self._step_task = asyncio.create_task(ROUTINES[step.kind](self.work, step))
         try:
@@ -305,7 +309,6 @@ class Session:
             raise
         except StartOver as moved:
             self._failed(index, step, attempt, str(moved))
-            self._states = self.journal.states()
             return
         except (StoppedByOperator, GateRefused, BadInput) as error:
             self._failed(index, step, attempt, str(error))
@@ -313,8 +316,8 @@ class Session:
         finally:
             self._step_task = None
         self.journal.done(step.id, attempt, clock.now(), clock.utc(), done.result, done.reading)
-        self._states[step.id] = StepState("done", attempt, done.result)
-        self._again.discard(step.id)
+        for event in done.news:
+            self.observers.tell(event)
         self.observers.tell(StepDone(step.id, index, done.summary, clock.now()))
 
     def _skip_asked(self) -> str | None:
@@ -324,14 +327,11 @@ class Session:
     def _failed(self, index: int, step: Step, attempt: int, what: str) -> None:
         clock = self.station.clock
         self.journal.failed(step.id, attempt, clock.now(), clock.utc(), what)
-        self._states[step.id] = StepState("failed", attempt, {"what": what})
         self.observers.tell(StepFailed(step.id, index, what, clock.now()))
 
     def _skipped(self, index: int, step: Step, attempt: int, why: str) -> None:
         clock = self.station.clock
         self.journal.skipped(step.id, attempt, clock.now(), clock.utc(), why)
-        self._states[step.id] = StepState("skipped", attempt, {"why": why})
-        self._again.discard(step.id)
         self.observers.tell(StepSkipped(step.id, index, why, clock.now()))
 
     async def _watch(self) -> None:
@@ -359,7 +359,7 @@ class Session:
 
     def _finish(self) -> Outcome:
         run_folder = self.folder / RUN
-        readings = sum(row.kind == "reading" for row in self.journal.rows())
+        readings = self.journal.readings()
         self.journal.set_meta("finished_utc", datetime.now(UTC).isoformat(timespec="seconds"))
         self.observers.tell(Finished(str(run_folder), readings))
         return Outcome(self.folder, run_folder, readings)

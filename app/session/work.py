@@ -18,7 +18,7 @@ from app.session.events import (
     Suspended,
 )
 from app.session.hands import nobody_to_ask
-from app.session.journal import Journal, NewRow
+from app.session.journal import PARAMETERS, SMRS, Journal, NewRow
 from app.session.plan import Plan
 from app.session.station import Station
 from calib.arrays import Array
@@ -26,20 +26,18 @@ from calib.frames import Frame, nest_in_base
 from drivers.errors import DeviceError
 from drivers.interface import Alarm, MotionController, Tracker
 
-HOME = "home"
+Point = tuple[float, float, float]
 
 
 @dataclass
 class Memory:
-    """What the session knows by now; all of it can be had again from journal and devices."""
+    """What this process knows and no journal holds: of the devices, and what was worked out."""
 
     frame: Frame
+    """The base in the tracker's frame: as the site says, or fitted to what the journal holds."""
     frame_found: bool = False
-    first_reference: dict[str, tuple[float, float, float]] = field(default_factory=dict)
-    last_reference: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     verified: bool = True
     """Whether the last reference still holds; False after whatever may have moved things."""
-    smr_in: dict[int, str] = field(default_factory=dict)
     aimed_at: str = ""
     """Nest that the beam is on; empty: not known."""
     standing_at: str | None = None
@@ -49,16 +47,19 @@ class Memory:
     settled: bool = False
     channels: tuple[float, dict[str, float]] = field(default_factory=lambda: (0.0, {}))
     """When the channels were last asked for (machine s), and the answer."""
-    controller_parameters: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Done:
-    """How a step ended: a line for the operator, data for the journal, and its reading."""
+    """How a step ended: a line for the operator, data for the journal, and its reading.
+
+    ``news`` is told once all of that is in the journal, and not before.
+    """
 
     summary: str
     result: Mapping[str, Any] = field(default_factory=dict)
     reading: NewRow | None = None
+    news: tuple[Event, ...] = ()
 
 
 class StartOver(Exception):
@@ -89,7 +90,6 @@ class Work:
         self.guarded = False
         """Whether standing faults end the session: from the moment when old ones are cleared."""
         self.losses = 0
-        self.readings = sum(row.kind == "reading" for row in journal.rows())
         self._prompts: dict[str, tuple[tuple[str, ...], asyncio.Future[str]]] = {}
         self._asked = 0
 
@@ -119,10 +119,30 @@ class Work:
         """Look up a pose by its label; ``home`` is the machine's own."""
         return self.plan.poses.get(label, self.site.machine.home)
 
-    def journal_state(self, step: str) -> str:
-        """State of a step by the journal."""
-        found = self.journal.states().get(step)
-        return found.state if found else "planned"
+    # what the journal knows
+
+    @property
+    def smr_in(self) -> dict[int, str]:
+        """Nest where each SMR was last brought, as far as anybody said."""
+        return {int(smr): nest for smr, nest in self.journal.meta(SMRS, {}).items()}
+
+    def smr_brought(self, smr: int, nest: str) -> None:
+        """Remember where an SMR was brought."""
+        self.journal.set_meta(SMRS, {str(k): n for k, n in {**self.smr_in, smr: nest}.items()})
+
+    @property
+    def controller_parameters(self) -> dict[str, float]:
+        """Parameters that the controller held when the session connected."""
+        held: dict[str, float] = self.journal.meta(PARAMETERS, {})
+        return held
+
+    def first_references(self) -> dict[str, Point]:
+        """Each base nest as it was first read from the present stand (tracker frame, mm)."""
+        return {nest: seen[0] for nest, seen in self.journal.seen(self.site.base_nests).items()}
+
+    def last_references(self) -> dict[str, Point]:
+        """Each base nest as it was last read (tracker frame, mm)."""
+        return {nest: seen[-1] for nest, seen in self.journal.seen(self.site.base_nests).items()}
 
     # telling
 
@@ -158,9 +178,6 @@ class Work:
         """Set every reading aside; the plan's steps that took them are to be done again."""
         self.journal.invalidate(why, self.clock.now(), self.clock.utc())
         self.memory.frame_found = False
-        self.memory.first_reference.clear()
-        self.memory.last_reference.clear()
-        self.readings = 0
 
     # asking
 
@@ -188,10 +205,10 @@ class Work:
         given = ""
         try:
             given = await answer
+            self.note("answer", f"{text} -> {given}")
         finally:
             del self._prompts[prompt]
             self.tell(PromptAnswered(prompt, given))
-        self.note("answer", f"{text} -> {given}")
         return given
 
     def answer(self, prompt: str, choice: str) -> None:

@@ -27,7 +27,6 @@ class StepLine:
     """One line of the step list."""
 
     id: str
-    kind: str
     says: str
     state: str = "planned"
     note: str = ""
@@ -102,7 +101,7 @@ class Picture:
     def begin(self, session: Session) -> None:
         """Show another session: its steps and the readings that its journal holds already."""
         self.steps = [
-            StepLine(step.id, step.kind, step.says, state.state, _note(state.result))
+            StepLine(step.id, step.says, state.state, _note(state.result))
             for step, state in session.steps()
         ]
         self.purpose, self.title = session.plan.purpose, session.plan.title

@@ -1,5 +1,6 @@
 """Both orders of a campaign through the wires, and the run that they leave."""
 
+import sqlite3
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,6 +16,26 @@ from calib.model import Model
 from calib.runs.stack import stack
 
 OPTIONS = PlanOptions(reference_every=3, warm_up=False)
+
+
+def watch_the_journal(session: Session) -> None:
+    """Let another connection find what is told in the journal at the moment when it is told."""
+    viewer = sqlite3.connect(session.folder / "journal.sqlite")
+    started: list[str] = []
+
+    def hear(event: ev.Event) -> None:
+        if isinstance(event, ev.StepStarted):
+            started.append(event.step)
+        if isinstance(event, ev.ReadingTaken):
+            good = "FROM rows WHERE kind = 'reading' AND status = 'good'"
+            assert viewer.execute(f"SELECT count(*) {good}").fetchone() == (event.number,)
+            last = f"SELECT step, nest, time_s {good} ORDER BY seq DESC LIMIT 1"
+            assert viewer.execute(last).fetchone() == (started[-1], event.nest, event.time_s)
+        if isinstance(event, ev.ReadingTaken | ev.FrameFound | ev.DriftChecked | ev.StepDone):
+            end = viewer.execute("SELECT step, state FROM log ORDER BY seq DESC LIMIT 1")
+            assert end.fetchone() == (started[-1], "done")
+
+    session.observers.watch(hear)
 
 
 @pytest.mark.parametrize(
@@ -34,6 +55,7 @@ async def test_a_campaign_leaves_a_run_that_loads_and_fits(
         mock.site, measure_plan(mock.site, POSES, options), tmp_path, unattended=True
     )
     session.observers.watch(heard)
+    watch_the_journal(session)
     try:
         outcome = await session.run()
     finally:

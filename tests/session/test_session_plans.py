@@ -9,10 +9,10 @@ from session_mock import POSES, site_text
 
 from app.errors import GateRefused
 from app.files.site import Site, parse_site
+from app.session import kinds
 from app.session.path import check_waypoints, waypoints
 from app.session.plan import Plan
 from app.session.plans import Order, PlanOptions, measure_plan
-from app.session.routines import ROUTINES
 from calib.errors import BadInput
 
 
@@ -25,24 +25,25 @@ def site(tmp_path: Path) -> Site:
 def test_every_pose_is_read_in_every_nest_once_a_cycle(site: Site, order: Order) -> None:
     plan = measure_plan(site, POSES, PlanOptions(order=order, cycles=2, reference_every=4))
     reads = [
-        (s.args["pose"], s.args["nest"], s.args["cycle"]) for s in plan.steps if s.kind == "read"
+        (s.args["pose"], s.args["nest"], s.args["cycle"])
+        for s in plan.steps
+        if s.kind is kinds.READ
     ]
     wanted = {(p, n, c) for p in POSES for n in site.platform_nests for c in (1, 2)}
     assert set(reads) == wanted
     assert len(reads) == len(wanted)
     assert len({s.id for s in plan.steps}) == len(plan.steps)
-    assert {s.kind for s in plan.steps} <= set(ROUTINES)
-    groups = [s.args["group"] for s in plan.steps if s.kind == "drift"]
+    groups = [s.args["group"] for s in plan.steps if s.kind is kinds.DRIFT]
     assert groups[0] == "start"
     assert groups[-1] == "end"
     assert len(groups) > 3
 
 
 def test_nothing_moves_before_the_path_is_checked(site: Site) -> None:
-    kinds = [step.kind for step in measure_plan(site, POSES, PlanOptions()).steps]
-    moving = [kinds.index(kind) for kind in ("home", "move", "drives")]
-    assert kinds.index("connect") < kinds.index("check-path") < min(moving)
-    assert kinds[-1] == "rest"
+    order = [step.kind.name for step in measure_plan(site, POSES, PlanOptions()).steps]
+    moving = [order.index(kind) for kind in ("home", "move", "drives")]
+    assert order.index("connect") < order.index("check-path") < min(moving)
+    assert order[-1] == "rest"
 
 
 def test_the_same_campaign_gives_the_same_identifiers_and_reads_back(site: Site) -> None:

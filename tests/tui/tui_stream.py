@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from app.files.site import Site
-from app.session import PlanOptions, Session, measure_plan
+from app.session import PlanOptions, Session, kinds, measure_plan
 from app.session import events as ev
 from app.session.known import Snapshot
 from app.session.plan import Plan
@@ -92,16 +92,16 @@ def measured(plan: Plan, until: int) -> list[ev.Event]:
     number = 0
     for index, step in enumerate(plan.steps[: until + 1]):
         time_s = 10.0 * index
-        told.append(ev.StepStarted(step.id, index, step.kind, step.says, 1, time_s))
+        told.append(ev.StepStarted(step.id, index, step.kind.name, step.says, 1, time_s))
         if index == until:
             break
-        if step.kind == "move":
+        if step.kind is kinds.MOVE:
             pose = plan.poses[step.args["pose"]]
             q = tuple(230.0 + 3.0 * math.sin(index + leg) for leg in range(6))
             told.append(ev.PoseCommanded(step.args["pose"], pose, q, time_s))
-        if step.kind in ("read", "reference"):
+        if step.kind in (kinds.READ, kinds.REFERENCE):
             number += 1
-            miss = 0.6 + 0.2 * math.sin(index) if step.kind == "read" else 0.008
+            miss = 0.6 + 0.2 * math.sin(index) if step.kind is kinds.READ else 0.008
             told += [ev.LiveScatter(0.03 / (1 + k), 0.02, (0.0, 0.0, 0.0), k > 1) for k in range(5)]
             told.append(
                 ev.ReadingTaken(
@@ -109,7 +109,7 @@ def measured(plan: Plan, until: int) -> list[ev.Event]:
                     (0.0, 0.0, 0.0), (0.0, 0.0, miss), miss, 0.006, time_s,
                 )
             )  # fmt: skip
-        if step.kind == "drift":
+        if step.kind is kinds.DRIFT:
             told.append(ev.FrameFound((0.0,) * 6, 0.0041, ("b1", "b2", "b3")))
             told.append(ev.DriftChecked(0.0067, 0.05, time_s))
         told.append(ev.StepDone(step.id, index, f"{step.says}: done", time_s + 5.0))

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Coroutine
 from typing import Any
 
+from app.session import kinds
+from app.session.kinds import StepKind
 from app.session.plan import Step
 from app.session.routines.carrying import carry, confirm
 from app.session.routines.moving import home, move
@@ -14,25 +16,20 @@ from app.session.work import Done, Work
 
 Routine = Callable[[Work, Step], Coroutine[Any, Any, Done]]
 
-ROUTINES: dict[str, Routine] = {
-    "connect": connect,
-    "check-path": check_path,
-    "tracker": tracker,
-    "drives": drives,
-    "warm-up": warm_up,
-    "home": home,
-    "move": move,
-    "carry": carry,
-    "confirm": confirm,
-    "read": read,
-    "reference": reference,
-    "drift": drift,
-    "two-face": two_face,
-    "rest": rest,
-    "truth": truth,
+ROUTINES: dict[StepKind, Routine] = {
+    kinds.CONNECT: connect,
+    kinds.CHECK_PATH: check_path,
+    kinds.TRACKER: tracker,
+    kinds.DRIVES: drives,
+    kinds.WARM_UP: warm_up,
+    kinds.HOME: home,
+    kinds.MOVE: move,
+    kinds.CARRY: carry,
+    kinds.CONFIRM: confirm,
+    kinds.READ: read,
+    kinds.REFERENCE: reference,
+    kinds.DRIFT: drift,
+    kinds.TWO_FACE: two_face,
+    kinds.REST: rest,
+    kinds.TRUTH: truth,
 }
-
-# Done again whenever a process takes a session over: what they check is not in the journal.
-EVERY_TIME = frozenset({"connect", "check-path", "tracker", "drives"})
-
-NEVER_SKIPPED = frozenset({"connect", "check-path", "tracker", "drives", "rest"})

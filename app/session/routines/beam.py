@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager
 import numpy as np
 
 from app.errors import StoppedByOperator
+from app.files.pose_table import HOME
 from app.session.events import LiveScatter
 from app.session.work import Work
 from drivers.errors import BeamBroken, DeviceError, MeasurementError, NoTarget, NotReady
@@ -30,7 +31,7 @@ async def aim(work: Work, nest: str) -> None:
     """
     if work.memory.aimed_at == nest:
         return
-    x, y, z = work.predict(nest, work.memory.standing_at or "home")
+    x, y, z = work.predict(nest, work.memory.standing_at or HOME)
     work.memory.aimed_at = ""
     await work.tracker.point_at((float(x), float(y), float(z)))
     work.memory.aimed_at = nest
@@ -158,7 +159,7 @@ async def recover(work: Work, nest: str, lost: DeviceError) -> None:
 
 async def _relocked(work: Work, nest: str) -> bool:
     """Point at the predicted place, then search around it."""
-    x, y, z = work.predict(nest, work.memory.standing_at or "home")
+    x, y, z = work.predict(nest, work.memory.standing_at or HOME)
     try:
         await work.tracker.point_at((float(x), float(y), float(z)))
     except (NoTarget, BeamBroken):

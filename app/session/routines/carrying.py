@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from app.files.pose_table import HOME
 from app.session.journal import NewRow
 from app.session.plan import Step
 from app.session.routines.beam import measured
 from app.session.routines.moving import ensure_at
-from app.session.work import HOME, Done, Work
+from app.session.work import Done, Work
 from calib.arrays import Array
 from drivers.errors import BeamBroken, NoTarget
 
@@ -28,8 +29,7 @@ async def bring(work: Work, smr: int, nest: str, why: str = "") -> None:
         return await work.ask(text, choices)
 
     await work.station.carrier.carry(smr, nest, ask, why)
-    work.memory.smr_in[smr] = nest
-    work.journal.set_meta("smrs", {str(k): v for k, v in work.memory.smr_in.items()})
+    work.smr_brought(smr, nest)
     work.memory.aimed_at = ""
 
 
@@ -37,7 +37,7 @@ async def ensure_smr(work: Work, nest: str) -> None:
     """Let a nest be occupied, as far as we know; the reading itself proves it."""
     if nest in work.site.base_nests and work.site.hands.base_smrs:
         return
-    if nest not in work.memory.smr_in.values():
+    if nest not in work.smr_in.values():
         nests = list(work.site.platform_nests)
         own = nests.index(nest) + 1 if nest in nests else 1
         await bring(work, own if own <= work.site.hands.smrs else 1, nest)
@@ -68,7 +68,7 @@ def wrong_hole(nest: str, what: str) -> NoTarget:
 
 async def again(work: Work, nest: str, why: str) -> None:
     """Have the SMR of a nest put right."""
-    smr = next((s for s, n in work.memory.smr_in.items() if n == nest), 1)
+    smr = next((s for s, n in work.smr_in.items() if n == nest), 1)
     await bring(work, smr, nest, why)
 
 

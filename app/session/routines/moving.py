@@ -4,11 +4,11 @@ import asyncio
 
 import numpy as np
 
-from app.files.pose_table import Pose
+from app.files.pose_table import HOME, Pose
 from app.session.events import LivePose, PoseCommanded
 from app.session.journal import NewRow
 from app.session.plan import Step
-from app.session.work import HOME, Done, Work
+from app.session.work import Done, Work
 from calib.mechanism.rigid import Poses
 from calib.mechanism.task import FULL, task_values
 

@@ -3,6 +3,7 @@
 import asyncio
 
 from app.errors import StoppedByOperator
+from app.session.journal import PARAMETERS
 from app.session.known import compare_with_known
 from app.session.path import check_waypoints, waypoints
 from app.session.plan import Step
@@ -29,9 +30,8 @@ async def connect(work: Work, step: Step) -> Done:
     await _clear_old_faults(work)
     work.guarded = True
     held = await compare_with_known(work.site, work.controller, work.expected)
-    work.memory.controller_parameters = dict(held.values)
-    first = work.journal.meta("controller_parameters")
-    if first is not None and first != held.values:
+    first = work.controller_parameters
+    if first and first != held.values:
         work.alarm(
             "controller",
             "its parameters are not those that this session began with",
@@ -46,7 +46,7 @@ async def connect(work: Work, step: Step) -> Done:
         "controller": vars(work.controller.identity),
         "tracker": vars(work.tracker.identity),
     }
-    work.journal.set_meta("controller_parameters", held.values)
+    work.journal.set_meta(PARAMETERS, held.values)
     work.journal.set_meta("identities", identities)
     await take_stock(work)
     return Done(f"{len(held.values)} parameters as expected", {"checksum": held.checksum})
@@ -68,7 +68,7 @@ async def check_path(work: Work, step: Step) -> Done:
     """Check every pose and the way between them against all limits, before anything moves."""
     path = waypoints(work.plan)
     least = check_waypoints(
-        work.site.machine, work.memory.controller_parameters, [work.pose(p) for p in path], path
+        work.site.machine, work.controller_parameters, [work.pose(p) for p in path], path
     )
     return Done(f"{len(path)} moves, {least:.1f} mm or more from every actuator limit")
 

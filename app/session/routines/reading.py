@@ -1,9 +1,11 @@
 """One reading: everything that it needs is made sure of, then settle, dwell, judge, write."""
 
 import asyncio
+import math
 
 import numpy as np
 
+from app.files.pose_table import HOME
 from app.session.events import ReadingTaken
 from app.session.journal import NewRow
 from app.session.plan import Step
@@ -50,7 +52,11 @@ async def read(work: Work, step: Step) -> Done:
         if not wrong:
             row = reading_row(work, reading, begun, label, nest, state_channels)
             row = _with_cycle(row, step.args.get("cycle"))
-            return Done(_told(work, row), {"nest": nest}, row)
+            taken = reading_taken(work, row)
+            says = (
+                f"nest {nest}: {1e3 * taken.miss_mm:.0f} um from where the controller's model says"
+            )
+            return Done(says, {"nest": nest}, row, (taken,))
         work.set_aside(rejected_row(work, label, nest, reading.xyz, wrong))
         work.alarm(f"nest {nest}", wrong, f"Put the SMR back into nest {nest}")
         work.memory.aimed_at = ""
@@ -103,30 +109,23 @@ def _with_cycle(row: NewRow, cycle: int | None) -> NewRow:
     return NewRow(**{**vars(row), "cycle": cycle})
 
 
-def _told(work: Work, row: NewRow) -> str:
-    """Tell the observers of a reading; returns the line for the operator."""
+def reading_taken(work: Work, row: NewRow) -> ReadingTaken:
+    """What is to be told of a reading when it is in the journal."""
     assert row.xyz is not None
     assert row.covariance is not None
-    label = row.pose or work.memory.standing_at or "home"
-    predicted = work.predict(row.nest, label)
-    miss = float(np.linalg.norm(np.array(row.xyz) - predicted))
-    sigma = float(np.sqrt(sum(row.covariance[:3])))
-    work.readings += 1
-    work.tell(
-        ReadingTaken(
-            number=work.readings,
-            pose_label=row.pose,
-            nest=row.nest,
-            q=row.q,
-            xyz=row.xyz,
-            predicted=(float(predicted[0]), float(predicted[1]), float(predicted[2])),
-            miss_mm=miss,
-            sigma_mm=sigma,
-            time_s=row.time_s,
-            channels=row.channels or {},
-        )
+    x, y, z = (float(value) for value in work.predict(row.nest, row.pose or HOME))
+    return ReadingTaken(
+        number=work.journal.readings() + 1,
+        pose_label=row.pose,
+        nest=row.nest,
+        q=row.q,
+        xyz=row.xyz,
+        predicted=(x, y, z),
+        miss_mm=math.dist(row.xyz, (x, y, z)),
+        sigma_mm=math.sqrt(sum(row.covariance[:3])),
+        time_s=row.time_s,
+        channels=row.channels or {},
     )
-    return f"nest {row.nest}: {1e3 * miss:.0f} um from where the controller's model says"
 
 
 async def in_band(work: Work) -> dict[str, float]:

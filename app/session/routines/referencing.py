@@ -4,14 +4,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from app.session.events import DriftChecked, FrameFound, ReadingTaken
+from app.files.pose_table import HOME
+from app.session.events import DriftChecked, FrameFound
 from app.session.plan import Step
 from app.session.routines.beam import measured
 from app.session.routines.carrying import ensure_smr, rejected_row
 from app.session.routines.moving import ensure_at
 from app.session.routines.preparing import channels
-from app.session.routines.reading import reading_row
-from app.session.work import HOME, Done, Work
+from app.session.routines.reading import reading_row, reading_taken
+from app.session.work import Done, Work
 from calib.arrays import Array
 from calib.frames import exchanged, fit_frame
 from drivers.errors import NotReady
@@ -37,23 +38,14 @@ async def reference(work: Work, step: Step) -> Done:
             remedy="Check the SMR in that nest and the tracker's frame in the site file",
         )
     row = reading_row(work, reading, begun, "", nest, await channels(work))
-    work.memory.last_reference[nest] = reading.xyz
-    if not work.memory.frame_found:
-        work.memory.first_reference[nest] = reading.xyz
-    work.readings += 1
-    p = work.predict(nest, HOME)
-    work.tell(
-        ReadingTaken(
-            work.readings, "", nest, row.q, reading.xyz, (float(p[0]), float(p[1]), float(p[2])),
-            miss, float(np.sqrt(sum(reading.covariance[:3]))), begun, row.channels or {},
-        )
-    )  # fmt: skip
-    return Done(f"{nest} read, {miss:.3f} mm from its predicted place", {"nest": nest}, row)
+    says = f"{nest} read, {miss:.3f} mm from its predicted place"
+    return Done(says, {"nest": nest}, row, (reading_taken(work, row),))
 
 
 async def drift(work: Work, step: Step) -> Done:
     """Fit the base to its nests: find it the first time, judge its drift every other time."""
-    nests = [nest for nest in step.args["nests"] if nest in work.memory.last_reference]
+    last = work.last_references()
+    nests = [nest for nest in step.args["nests"] if nest in last]
     if len(nests) < 3:
         raise NotReady(
             f"only {len(nests)} base nests were read; three are needed",
@@ -61,19 +53,20 @@ async def drift(work: Work, step: Step) -> Done:
             remedy="Go on and do not skip the reference nests",
         )
     drawn = {nest: np.array(work.site.base_nests[nest]) for nest in nests}
-    seen = {nest: np.array(work.memory.last_reference[nest]) for nest in nests}
+    seen = {nest: np.array(last[nest]) for nest in nests}
     frame, rms = fit_frame(_stack(drawn, nests), _stack(seen, nests))
     if rms > work.limits.base_fit_mm:
         raise _misfit(drawn, seen, rms)
-    work.tell(FrameFound(frame.numbers(), rms, tuple(nests)))
+    found = FrameFound(frame.numbers(), rms, tuple(nests))
     if not work.memory.frame_found:
         work.memory.frame, work.memory.frame_found = frame, True
-        return Done(f"base found, {1e3 * rms:.1f} um RMS over {len(nests)} nests", {"rms_mm": rms})
-    first, _ = fit_frame(_stack(drawn, nests), _stack(work.memory.first_reference, nests))
+        says = f"base found, {1e3 * rms:.1f} um RMS over {len(nests)} nests"
+        return Done(says, {"rms_mm": rms}, news=(found,))
+    first, _ = fit_frame(_stack(drawn, nests), _stack(work.first_references(), nests))
     at_home = np.array(work.site.machine.home[:3])
     shift = float(np.linalg.norm(frame.apply(at_home) - first.apply(at_home)))
     limit = work.limits.drift_mm
-    work.tell(DriftChecked(shift, limit, work.clock.now()))
+    checked = DriftChecked(shift, limit, work.clock.now())
     if shift > limit:
         work.alarm(
             "drift",
@@ -82,7 +75,8 @@ async def drift(work: Work, step: Step) -> Done:
             "The run goes on; fit it with the tracker-drift effect, or measure again",
         )
     work.memory.frame = frame
-    return Done(f"base moved {1e3 * shift:.1f} um", {"shift_mm": shift, "rms_mm": rms})
+    says = f"base moved {1e3 * shift:.1f} um"
+    return Done(says, {"shift_mm": shift, "rms_mm": rms}, news=(found, checked))
 
 
 def _stack(points: Mapping[str, Array | tuple[float, ...]], nests: list[str]) -> Array:

@@ -25,11 +25,12 @@ async def reverify(work: Work) -> None:
         If that is the operator's answer.
     """
     work.memory.verified = True
-    if not (work.site.hands.base_smrs and work.memory.last_reference):
+    last = work.last_references()
+    if not (work.site.hands.base_smrs and last):
         return
-    reference = next(iter(work.memory.last_reference))
+    reference = next(iter(last))
     reading, _ = await measured(work, reference, _LOOK_S)
-    before = np.array(work.memory.last_reference[reference])
+    before = np.array(last[reference])
     shift = float(np.linalg.norm(np.array(reading.xyz) - before))
     work.memory.aimed_at = ""
     if shift <= work.limits.drift_mm:
