@@ -10,7 +10,7 @@ import numpy as np
 
 from app.files.machines import load_machine, shipped_machines
 from app.files.poses import read_any_poses
-from app.files.runs import HEADER, POINTS
+from app.files.runs import write_run
 from calib.errors import BadInput
 from calib.mechanism.rigid import Poses
 from calib.mechanism.task import task_values
@@ -53,11 +53,9 @@ def simulate_prototype(
     else:
         rows = np.array(list(read_any_poses(Path(asked_poses), machine).values()))
         poses = solve_poses(machine, task_values(machine.task, Poses.from_xyz_rpy(rows.T)))
-    out.mkdir(parents=True, exist_ok=True)
     named = name if name in shipped_machines() else os.path.relpath(name, out)
-    run = prototype_run(machine, named, poses, parameters, 1e-3 * noise, room, options["cycles"])
-    (out / HEADER).write_text(run.run_text, encoding="utf-8")
-    (out / POINTS).write_text(run.points_text, encoding="utf-8")
+    made = prototype_run(machine, named, poses, parameters, 1e-3 * noise, room, options["cycles"])
+    write_run(out, made.run)
     place = truth or out / "truth.json"
     values = {p.name: float(v) for p, v in zip(machine.parameters, parameters, strict=True)}
     said = {"hidden": {}, "sigma_mm": 1e-3 * noise, "parameters": values}
@@ -69,6 +67,6 @@ def simulate_prototype(
         "truth": str(place),
         "seed": options["seed"],
         "poses": poses.q.shape[1],
-        "readings": run.readings,
+        "readings": made.run.readings,
         "hidden": {},
     }

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from app.files.machines import read_text
 from app.files.pose_table import Pose
 from app.files.site import Site, load_site
+from app.files.text import read_text
 from app.session.journal import PARAMETERS, PLANNED, Journal, Row
 from app.session.kinds import TRUTH
 from app.session.plan import Plan

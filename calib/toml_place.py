@@ -2,9 +2,11 @@
 
 import re
 import tomllib
+from collections import Counter
 from typing import Any
 
 from calib.errors import BadInput
+from calib.plain_text import plain
 
 _HEADER = re.compile(r"^\s*\[{1,2}\s*(.+?)\s*\]{1,2}\s*(#.*)?$")
 _KEY = re.compile(
@@ -13,25 +15,30 @@ _KEY = re.compile(
 _PART = re.compile(r"[A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*'")
 
 
-def _parts(dotted: str) -> tuple[str, ...]:
+def _parts(dotted: str) -> tuple[str | int, ...]:
     return tuple(part.strip("\"'") for part in _PART.findall(dotted))
 
 
-def line_of(text: str, *keys: str) -> int:
+def line_of(text: str, *keys: str | int) -> int:
     """Line (from 1) on which ``keys`` is set, or the nearest enclosing table; 1 if none is.
 
     Parameters
     ----------
     text : str
         TOML source.
-    *keys : str
-        Path of the key, for example ``"limbs", "leg1", "B_x"``.
+    *keys : str or int
+        Path of the key, for example ``"limbs", "leg1", "B_x"``; a number behind the name of an
+        array of tables says which of them, from 0.
     """
     best, best_length = 1, 0
-    table: tuple[str, ...] = ()
-    for number, line in enumerate(text.splitlines(), start=1):
+    table: tuple[str | int, ...] = ()
+    arrays: Counter[tuple[str | int, ...]] = Counter()
+    for number, line in enumerate(text.split("\n"), start=1):
         if header := _HEADER.match(line):
             table = _parts(header.group(1))
+            if line.lstrip().startswith("[["):
+                arrays[table] += 1
+                table = (*table, arrays[table] - 1)
             path = table
         elif key := _KEY.match(line):
             path = table + _parts(key.group(1))
@@ -43,14 +50,26 @@ def line_of(text: str, *keys: str) -> int:
 
 
 def load_toml(text: str, source: str) -> dict[str, Any]:
-    """Parse TOML; a syntax error becomes :class:`BadInput` with file and line."""
+    """Parse TOML; what is empty or no TOML becomes :class:`BadInput` with file, line and column.
+
+    A byte order mark at the beginning and any line ends are tolerated.
+    """
+    text = plain(text)
+    if not text.strip():
+        raise BadInput(
+            "the file is empty", place=f"{source}, line 1", remedy="It begins with its format"
+        )
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # brackets in thousands, numbers of a page
         message = str(error)
         found = re.search(r"\(at line (\d+), column (\d+)\)", message)
-        line = f", line {found.group(1)}" if found else f", line {len(text.splitlines()) or 1}"
-        what = re.sub(r"\s*\(at [^)]*\)", "", message)
+        if found:
+            place = f"{source}, line {found.group(1)}, column {found.group(2)}"
+            what = message[: found.start()].strip()
+        else:
+            place = f"{source}, line {len(text.splitlines())}"
+            what = message.replace("(at end of document)", "at the end of the file")
         raise BadInput(
-            f"this is not valid TOML: {what}", place=f"{source}{line}", remedy="Correct the syntax."
+            f"not valid TOML: {what}", place=place, remedy="Correct this line"
         ) from error

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.files.machines import read_text
+from app.files.text import read_text
 from calib.errors import BadInput
 from calib.toml_place import load_toml
 from calib.unknown import Estimate, Unknown

@@ -3,6 +3,7 @@
 from importlib import resources
 from pathlib import Path
 
+from app.files.text import read_text
 from calib.errors import BadInput
 from calib.mechanism.check import require_sound
 from calib.mechanism.description import Machine
@@ -48,15 +49,3 @@ def load_machine(name_or_path: str, relative_to: Path | None = None) -> Machine:
     machine = parse_machine(text, str(path))
     require_sound(machine, text)
     return machine
-
-
-def read_text(path: Path) -> str:
-    """Read a UTF-8 file; what cannot be read is bad input."""
-    try:
-        return path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise BadInput(
-            f"not UTF-8 text (byte {error.start})", place=str(path), remedy="Save it as UTF-8"
-        ) from error
-    except OSError as error:
-        raise BadInput(error.strerror or str(error), place=str(path)) from error

@@ -12,7 +12,7 @@ from typing import Any
 
 import tomli_w
 
-from app.files.runs import read_text
+from app.files.text import read_text
 from calib.arrays import Array
 from calib.effects import Effect, Signature, Situation, Unknown, effect_named, is_shipped
 from calib.errors import BadInput

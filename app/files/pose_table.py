@@ -14,7 +14,7 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 
-from app.files.machines import read_text
+from app.files.text import read_text
 from calib.errors import BadInput
 
 Pose = tuple[float, float, float, float, float, float]

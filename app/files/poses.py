@@ -10,17 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from app.files.machines import read_text
 from app.files.pose_table import Pose, read_poses
-from app.files.toml_reader import TableReader
+from app.files.text import read_text
 from calib.arrays import Array
-from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.limits import violations
 from calib.poses.design import Design
 from calib.poses.reach import PoseSet, solve_poses
-from calib.quantity import quantity
-from calib.toml_place import load_toml
+from calib.toml_table import TomlTable
 
 FORMAT = "pkm-poses/1"
 Q_AGREES = 0.01
@@ -73,56 +70,43 @@ def read_any_poses(path: Path, machine: Machine) -> dict[str, Pose]:
 
 def parse_pose_file(text: str, source: str, machine: Machine) -> PoseFile:
     """Check the text of a poses file."""
-    data = load_toml(text, source)
-    top = TableReader(data, text, source)
-    top.choice("format", [FORMAT])
+    return pose_file_of(TomlTable.parse(text, source), source, machine)
+
+
+def pose_file_of(top: TomlTable, source: str, machine: Machine) -> PoseFile:
+    """Check the tables of a poses file."""
+    top.format(FORMAT)
     name = top.text("machine", machine.name)
     if name != machine.name:
         raise top.wrong(
-            "machine",
             f'these poses are for "{name}", the machine is "{machine.name}"',
-            "Choose poses for this machine: pkmcal poses",
+            "machine",
+            remedy="Choose poses for this machine: pkmcal poses",
         )
     title = top.text("title", "")
-    design = data.get("design", {})
-    top.table("design", required=False)
-    poses = top.table("poses")
+    notes = top.named("design", required=False)
+    design = {key: notes.raw(key) for key in notes}
+    poses = top.named("poses")
     top.end()
-    labels = tuple(poses.keys())
+    labels = tuple(poses.names())
     if not labels:
-        raise top.wrong("poses", "there is no pose", 'p01 = { x = 1.0, ..., rx = "2 deg" }')
-    task = np.array(
-        [_coordinates(poses, label, data["poses"][label], machine) for label in labels]
-    ).T
+        raise top.wrong(
+            "there is no pose", "poses", remedy='Write p01 = { x = 1.0, ..., rx = "2 deg" }'
+        )
+    task = np.array([_coordinates(poses, label, machine) for label in labels]).T
     pose_set = solve_poses(machine, task)
     _check_reach(pose_set, labels, poses)
-    _check_q(pose_set, labels, poses, data["poses"])
+    _check_q(pose_set, labels, poses)
     return PoseFile(source, title, labels, pose_set, design)
 
 
-def _coordinates(poses: TableReader, label: str, row: Any, machine: Machine) -> list[float]:
-    names = machine.task.coordinates
-    if not isinstance(row, Mapping):
-        raise poses.wrong(label, f'pose "{label}" is {row!r}', f"Write {{ {names[0]} = 1.0, ... }}")
-    for key in row:
-        if key not in (*names, "q"):
-            raise poses.wrong(
-                label, f'pose "{label}" has an unknown "{key}"', f"Known: {', '.join(names)}, q"
-            )
-    values = []
-    for name in names:
-        if name not in row:
-            raise poses.wrong(label, f'pose "{label}" has no {name}', f"Add {name} = ...")
-        try:
-            values.append(quantity(row[name], "mm" if name in "xyz" else "rad", ""))
-        except BadInput as wrong:
-            raise poses.wrong(
-                label, f'pose "{label}", {name}: {wrong.what}', wrong.remedy
-            ) from None
-    return values
+def _coordinates(poses: TomlTable, label: str, machine: Machine) -> list[float]:
+    pose, names = poses.table(label), machine.task.coordinates
+    pose.only(*names, "q")
+    return [pose.quantity(name, "mm" if name in "xyz" else "rad") for name in names]
 
 
-def _check_reach(pose_set: PoseSet, labels: tuple[str, ...], poses: TableReader) -> None:
+def _check_reach(pose_set: PoseSet, labels: tuple[str, ...], poses: TomlTable) -> None:
     for seen in violations(pose_set.machine, pose_set.configuration)[:1]:
         label = labels[seen.pose]
         where = (
@@ -132,28 +116,23 @@ def _check_reach(pose_set: PoseSet, labels: tuple[str, ...], poses: TableReader)
             else seen.what
         )
         raise poses.wrong(
-            label, f'pose "{label}" is out of reach: {where}', "Leave it out, or move it inward"
+            f'pose "{label}" is out of reach: {where}',
+            label,
+            remedy="Leave it out, or move it inward",
         )
 
 
-def _check_q(
-    pose_set: PoseSet, labels: tuple[str, ...], poses: TableReader, data: Mapping[str, Any]
-) -> None:
+def _check_q(pose_set: PoseSet, labels: tuple[str, ...], poses: TomlTable) -> None:
     """Refuse poses whose q were computed for another machine; q is there for people to read."""
     for k, label in enumerate(labels):
-        held = data[label].get("q")
-        if held is None:
-            continue
-        own = pose_set.q[:, k]
-        if not isinstance(held, list) or len(held) != len(own):
-            raise poses.wrong(label, f'q of pose "{label}" is {held!r}', f"Give {len(own)} numbers")
-        given = np.array([quantity(value, "", "") for value in held])
+        pose, own = poses.table(label), pose_set.q[:, k]
+        given = np.array(pose.quantities("q", len(own), "", tuple(own)))
         if np.max(np.abs(given - own)) > Q_AGREES:
             raise poses.wrong(
-                label,
                 f'q of pose "{label}" is not what the machine file gives '
                 f"({given[0]:g} against {own[0]:.4f}, ...)",
-                "Choose the poses anew, or remove q: the controller computes it",
+                label,
+                remedy="Choose the poses anew, or remove q: the controller computes it",
             )
 
 

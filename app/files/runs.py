@@ -6,9 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from app.files.machines import load_machine
+from app.files.text import read_text
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
-from calib.runs import Run, format_run, parse_header, parse_run
+from calib.runs import Digits, Run, format_run, parse_header, parse_run
+from calib.runs.writing import EXACT
 from calib.toml_place import line_of
 
 HEADER = "run.toml"
@@ -22,25 +24,6 @@ class LoadedRun:
     folder: Path
     run: Run
     machine: Machine
-
-
-def read_text(path: Path) -> str:
-    """Read UTF-8 text; raises BadInput naming the file, and the line where it is not UTF-8."""
-    try:
-        raw = path.read_bytes()
-    except FileNotFoundError:
-        raise BadInput("the file is missing", place=str(path)) from None
-    except IsADirectoryError:
-        raise BadInput("this is a folder, not a file", place=str(path)) from None
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = raw[: error.start].count(b"\n") + 1
-        raise BadInput(
-            f"byte 0x{raw[error.start]:02x} is not UTF-8 text",
-            place=f"{path}, line {line}",
-            remedy="Expected plain UTF-8; save the file again as UTF-8",
-        ) from error
 
 
 def read_run(folder: str | Path) -> LoadedRun:
@@ -116,13 +99,19 @@ def outside_runs(path: Path | None, folders: tuple[str, ...]) -> None:
             )
 
 
-def write_run(folder: Path, run: Run) -> None:
-    """Write a run into a folder that holds none yet; raises BadInput if it does."""
+def write_run(folder: Path, run: Run, digits: Digits = EXACT, *, replace: bool = False) -> None:
+    """Write a run's two files, each of them whole or not at all.
+
+    A folder that holds a run already is refused (BadInput), or its run is replaced.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    for name, text in zip((HEADER, POINTS), format_run(run), strict=True):
-        path = folder / name
-        if path.exists():
+    texts = dict(zip((HEADER, POINTS), format_run(run, digits), strict=True))
+    for name in texts:
+        if not replace and (folder / name).exists():
             raise BadInput(
-                "the file exists already", place=str(path), remedy="Choose another folder"
+                "the file exists already", place=str(folder / name), remedy="Choose another folder"
             )
-        path.write_bytes(text.encode("utf-8"))
+    for name in (POINTS, HEADER):
+        draft = (folder / name).with_suffix(".draft")
+        draft.write_text(texts[name], encoding="utf-8", newline="\n")
+        draft.replace(folder / name)

@@ -1,40 +1,9 @@
 """The site file: what stands in this lab, at which address, and what is normal here.
 
-::
-
-    format = "pkm-site/1"
-    machine = "hexapod"               # a shipped machine, or the path of a machine file
-
-    [controller]
-    kind = "canopen"
-    interface = "slcan"               # any python-can interface
-    channel = "socket://127.0.0.1:40001"
-    node = 10                         # the controller's node; the drives are 1, 2, ...
-    serial = "..."                    # optional; refused at connect if another one answers
-
-    [controller]                      # or one that speaks GCS 2.0
-    kind = "gcs"
-    port = "COM3"                     # "/dev/ttyUSB0", "socket://192.168.0.5:50000"
-    baudrate = 115200
-    axes = "A B C"                    # what it calls the actuators, in their order
-    pose_axes = "X Y Z"               # and the coordinates of the platform
-
-    [tracker]
-    kind = "emscon"
-    address = "192.168.0.1:700"
-    reflector = "CCR-1.5in"           # as the tracker calls it
-    frame = [-900.0, -900.0, -400.0, 0.0, 0.0, 0.3]  # base frame in the tracker frame, roughly
-
-    [nests.platform]                  # SMR centres, platform frame, mm
-    "3" = [0.0, 100.0, 0.0]
-    [nests.base]                      # SMR centres, base frame, mm
-    b1 = [260.0, 0.0, -30.0]
-
-    [hands]
-    kind = "operator"                 # who carries SMRs: a person, or the mock's control socket
-    smrs = 1                          # how many SMRs there are for the platform
+The format ``pkm-site/1`` is described in docs/site-file.md.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -42,13 +11,15 @@ from typing import Any
 
 import tomli_w
 
-from app.files.machines import load_machine, read_text
-from app.files.toml_reader import TableReader
+from app.files.machines import load_machine
+from app.files.text import read_text
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
-from calib.toml_place import load_toml
+from calib.runs.header import Load, load_of
+from calib.toml_table import TomlTable
 
 FORMAT = "pkm-site/1"
+FARTHEST_MM = 1e9
 
 
 @dataclass(frozen=True)
@@ -131,7 +102,7 @@ class Site:
     tracker: TrackerSite
     platform_nests: Mapping[str, tuple[float, ...]]
     base_nests: Mapping[str, tuple[float, ...]]
-    load: Mapping[str, Any]
+    load: Load | None
     hands: Hands
     limits: Limits
     clock_scale: float
@@ -149,26 +120,27 @@ def load_site(path: Path) -> Site:
 
 def parse_site(text: str, source: str, folder: Path) -> Site:
     """Check the text of a site file; paths in it start from ``folder``."""
-    data = load_toml(text, source)
-    top = TableReader(data, text, source)
-    top.choice("format", [FORMAT])
+    return site_of(TomlTable.parse(text, source), source, folder)
+
+
+def site_of(top: TomlTable, source: str, folder: Path) -> Site:
+    """Check the tables of a site file."""
+    top.format(FORMAT)
     machine_name = top.text("machine")
     machine = load_machine(machine_name, folder)
-    if machine_name.endswith(".toml"):
-        data["machine"] = str((folder / machine_name).resolve())
     nests = top.table("nests")
-    platform, base = nests.table("platform"), nests.table("base")
+    platform, base = nests.named("platform"), nests.named("base")
     site = Site(
         source=source,
-        data=data,
+        data=_standing_alone(top, machine_name, folder),
         title=top.text("title", ""),
         machine_name=machine_name,
         machine=machine,
         controller=_controller(top.table("controller"), len(machine.actuators)),
         tracker=_tracker(top.table("tracker")),
-        platform_nests={name: platform.vector(name, 3) for name in platform.keys()},  # noqa: SIM118
-        base_nests={name: base.vector(name, 3) for name in base.keys()},  # noqa: SIM118
-        load=_load(top.table("load", required=False)),
+        platform_nests={name: _centre(platform, name) for name in platform},
+        base_nests={name: _centre(base, name) for name in base},
+        load=_load(top),
         hands=_hands(top.table("hands", required=False)),
         limits=_limits(top.table("limits", required=False)),
         clock_scale=_clock(top.table("clock", required=False)),
@@ -179,20 +151,32 @@ def parse_site(text: str, source: str, folder: Path) -> Site:
     return site
 
 
-def _check_nests(site: Site, base: TableReader) -> None:
+def _standing_alone(top: TomlTable, machine_name: str, folder: Path) -> dict[str, Any]:
+    """The file's tables, with a path of the machine file that holds from everywhere."""
+    data = {name: top.raw(name) for name in top}
+    if machine_name.endswith(".toml"):
+        data["machine"] = str((folder / machine_name).resolve())
+    return data
+
+
+def _centre(nests: TomlTable, name: str) -> tuple[float, ...]:
+    return nests.numbers(name, 3, unit="mm", most=FARTHEST_MM)
+
+
+def _check_nests(site: Site, base: TomlTable) -> None:
     if len(site.base_nests) < 3:
         raise base.wrong(
-            "", f"{len(site.base_nests)} base nests", "At least three tie tracker and base"
+            f"{len(site.base_nests)} base nests", remedy="At least three tie tracker and base"
         )
     if len(site.platform_nests) < 1:
-        raise base.wrong("", "no platform nest", "Give at least one in [nests.platform]")
+        raise base.wrong("no platform nest", remedy="Give at least one in [nests.platform]")
     both = set(site.base_nests) & set(site.platform_nests)
     if both:
         name = min(both)
-        raise base.wrong(name, f'nest "{name}" is on both', "Give every nest its own name")
+        raise base.wrong(f'nest "{name}" is on both', name, remedy="Give every nest its own name")
 
 
-def _controller(table: TableReader, actuators: int) -> ControllerSite:
+def _controller(table: TomlTable, actuators: int) -> ControllerSite:
     kind = table.choice("kind", ["canopen", "gcs"])
     serial = table.text("serial", "")
     settings = _gcs(table, actuators) if kind == "gcs" else _canopen(table)
@@ -200,7 +184,7 @@ def _controller(table: TableReader, actuators: int) -> ControllerSite:
     return ControllerSite(kind, serial, settings)
 
 
-def _canopen(table: TableReader) -> dict[str, Any]:
+def _canopen(table: TomlTable) -> dict[str, Any]:
     return {
         "interface": table.text("interface", "slcan"),
         "channel": table.text("channel"),
@@ -209,11 +193,11 @@ def _canopen(table: TableReader) -> dict[str, Any]:
     }
 
 
-def _gcs(table: TableReader, actuators: int) -> dict[str, Any]:
+def _gcs(table: TomlTable, actuators: int) -> dict[str, Any]:
     axes = table.text("axes", "A B C").split()
     if len(axes) != actuators:
         raise table.wrong(
-            "axes", f"{len(axes)} axes, {actuators} actuators", "Name one axis an actuator"
+            f"{len(axes)} axes, {actuators} actuators", "axes", remedy="Name one axis an actuator"
         )
     return {
         "channel": table.text("port"),
@@ -225,7 +209,7 @@ def _gcs(table: TableReader, actuators: int) -> dict[str, Any]:
     }
 
 
-def _tracker(table: TableReader) -> TrackerSite:
+def _tracker(table: TomlTable) -> TrackerSite:
     host, port = _address(table, "address", 700)
     site = TrackerSite(
         kind=table.choice("kind", ["emscon"]),
@@ -234,14 +218,14 @@ def _tracker(table: TableReader) -> TrackerSite:
         serial=table.text("serial", ""),
         model=table.text("model", "AT901-LR"),
         reflector=table.text("reflector", ""),
-        frame=table.vector("frame", 6),
-        frame_radius_mm=table.number("frame_radius_mm", 20.0, above=0.0),
+        frame=table.numbers("frame", 6, unit="mm, rad", most=FARTHEST_MM),
+        frame_radius_mm=table.number("frame_radius_mm", 20.0, unit="mm", above=0.0, most=math.inf),
     )
     table.end()
     return site
 
 
-def _hands(table: TableReader) -> Hands:
+def _hands(table: TomlTable) -> Hands:
     kind = table.choice("kind", ["operator", "mock"], "operator")
     host, port = _address(table, "control", 0) if kind == "mock" else ("", 0)
     hands = Hands(kind, host, port, table.whole("smrs", 1, least=1), table.flag("base_smrs", True))
@@ -249,43 +233,51 @@ def _hands(table: TableReader) -> Hands:
     return hands
 
 
-def _limits(table: TableReader) -> Limits:
+def _limits(table: TomlTable) -> Limits:
     known = Limits()
     values: dict[str, Any] = {}
     for name in Limits.__dataclass_fields__:
         default = getattr(known, name)
         if isinstance(default, tuple):
-            values[name] = table.vector(name, len(default), default)
+            values[name] = table.numbers(name, len(default), default, unit=_unit_in(name))
         else:
-            values[name] = table.number(name, default, least=0.0)
+            values[name] = table.number(
+                name, default, unit=_unit_in(name), least=0.0, most=math.inf
+            )
     table.end()
     return Limits(**values)
 
 
-def _clock(table: TableReader) -> float:
-    scale = table.number("scale", 1.0, above=0.0)
+def _unit_in(name: str) -> str:
+    """The unit with which a limit's name ends."""
+    for ending, unit in {"_mm": "mm", "_K_per_min": "K/min", "_s": "s", "_C": "deg C"}.items():
+        if name.endswith(ending):
+            return unit
+    raise ValueError(f"the limit {name} names no unit")
+
+
+def _clock(table: TomlTable) -> float:
+    scale = table.number("scale", 1.0, above=0.0, most=math.inf)
     table.end()
     return scale
 
 
-def _load(table: TableReader) -> dict[str, Any]:
-    load: dict[str, Any] = {}
-    for name in ("gravity", "platform_com", "payload_com"):
-        if table.has(name):
-            load[name] = list(table.vector(name, 3))
-    if table.has("platform_mass_kg"):
-        load["platform_mass_kg"] = table.number("platform_mass_kg", least=0.0)
+def _load(top: TomlTable) -> Load | None:
+    if not top.has("load"):
+        return None
+    table = top.table("load")
+    load = load_of(table)
     table.end()
     return load
 
 
-def _address(table: TableReader, key: str, default_port: int) -> tuple[str, int]:
+def _address(table: TomlTable, key: str, default_port: int) -> tuple[str, int]:
     text = table.text(key)
     host, colon, port = text.rpartition(":")
     if not colon and default_port:
         return text, default_port
     if not host or not port.isdigit() or not 0 < int(port) < 65536:
-        raise table.wrong(key, f'"{key}" is "{text}"', 'Write "host:port"')
+        raise table.wrong(f'{key} is "{text}"', key, remedy='Write "host:port"')
     return host, int(port)
 
 

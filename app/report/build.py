@@ -6,7 +6,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from app.analysis import load_rows
-from app.files.machines import read_text
+from app.files.text import read_text
 from app.report.calibration import Checked, calibration_page
 from app.session.plan import Plan
 from app.verification import FORMAT

@@ -1,19 +1,25 @@
-"""From the journal to a run on disk: ``run.toml`` and ``points.csv`` (docs: formats)."""
+"""From the journal to a run on disk: ``run.toml`` and ``points.csv`` (docs/run-format.md)."""
 
-import csv
-import io
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
-import tomli_w
+import numpy as np
 
+from app.files.runs import write_run
 from app.files.site import Site
 from app.session.journal import PARAMETERS, Journal, Row
 from app.session.plan import Plan
+from calib.arrays import Array
+from calib.runs import Digits, Header, Run, covariance_matrices
+
+DIGITS = Digits(
+    time=".3f", q=".9f", position=".7f", sigma=".8f", covariance=".6e", channel=".6g",
+    channels={"cycle": ".0f"},
+)  # fmt: skip
+"""A tenth of a nanometre, far below what a tracker tells."""
 
 _SAME = 1e-9
+_NOTHING = (np.nan,) * 6
 
 
 def export_run(site: Site, plan: Plan, journal: Journal, folder: Path) -> Path:
@@ -23,76 +29,55 @@ def export_run(site: Site, plan: Plan, journal: Journal, folder: Path) -> Path:
     after which nothing was read stays as a row without a reading, since the next direction of
     approach depends on it.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    _replace(folder / "points.csv", points_text(journal.rows(), len(site.machine.actuators)))
-    _replace(folder / "run.toml", tomli_w.dumps(_header(site, plan, journal)))
+    header = _header(site, plan, journal.meta(PARAMETERS, {}))
+    run = run_of(journal.rows(), header, len(site.machine.actuators))
+    write_run(folder, run, DIGITS, replace=True)
     return folder
 
 
-def _replace(path: Path, text: str) -> None:
-    draft = path.with_suffix(".draft")
-    draft.write_text(text, encoding="utf-8", newline="\n")
-    draft.replace(path)
-
-
-def _header(site: Site, plan: Plan, journal: Journal) -> dict[str, Any]:
-    held: dict[str, float] = journal.meta(PARAMETERS, {})
+def _header(site: Site, plan: Plan, held: Mapping[str, float]) -> Header:
     known = site.machine.parameter_index
-    header: dict[str, Any] = {
-        "format": "pkm-run/1",
-        "machine": site.machine_name,
-        "title": plan.title,
-        "tracker": {"model": site.tracker.model, "reflector": site.tracker.reflector},
-        "nests": {
-            "platform": {name: list(p) for name, p in site.platform_nests.items()},
-            "base": {name: list(p) for name, p in site.base_nests.items()},
-        },
-    }
-    if held:
-        header["controller"] = {"parameters": {n: v for n, v in held.items() if n in known}}
-        written = {n: v for n, v in held.items() if n not in known and v != 0.0}
-        if written:
-            header["controller"]["compensation"] = written
-    if site.load:
-        header["load"] = dict(site.load)
-    return header
+    return Header(
+        machine=site.machine_name,
+        title=plan.title,
+        tracker={"model": site.tracker.model, "reflector": site.tracker.reflector},
+        platform_nests={name: np.array(place) for name, place in site.platform_nests.items()},
+        base_nests={name: np.array(place) for name, place in site.base_nests.items()},
+        controller_parameters={name: v for name, v in held.items() if name in known},
+        compensation={name: v for name, v in held.items() if name not in known and v != 0.0},
+        load=site.load,
+    )
 
 
-def points_text(rows: Sequence[Row], actuators: int) -> str:
-    """Rows of a journal as the text of ``points.csv``."""
+def run_of(rows: Sequence[Row], header: Header, actuators: int) -> Run:
+    """Rows of a journal as a run."""
     kept = [row for i, row in enumerate(rows) if row.kind == "reading" or not _read_after(rows, i)]
-    channels = sorted({name for row in kept for name in row.channels})
+    six = np.array([row.covariance or _NOTHING for row in kept]).reshape(-1, 6).T
+    return Run(
+        header=header,
+        source="journal",
+        line=np.arange(len(kept)) + 2,
+        time_s=np.maximum.accumulate([row.time_s for row in kept]),
+        pose=tuple(row.pose for row in kept),
+        nest=tuple(row.nest for row in kept),
+        q=np.array([row.q for row in kept]).reshape(-1, actuators).T,
+        measured=np.array([row.xyz is not None for row in kept], dtype=bool),
+        position=np.array([row.xyz or _NOTHING[:3] for row in kept]).reshape(-1, 3).T,
+        covariance=covariance_matrices(six),
+        channels=_channels(kept),
+        left_aside={},
+    )
+
+
+def _channels(kept: Sequence[Row]) -> dict[str, Array]:
+    """Delay, cycle where there is any, and every other channel in alphabetical order."""
+    held: list[Mapping[str, float | None]] = [
+        {"delay_s": row.delay_s, "cycle": row.cycle, **row.channels} for row in kept
+    ]
     cycles = any(row.cycle is not None for row in kept)
-    names = ["time_s", "pose", "nest", *(f"q{i}" for i in range(1, actuators + 1))]
-    names += ["x", "y", "z", "sx", "sy", "sz", "sxy", "sxz", "syz", "delay_s"]
-    names += [*(["cycle"] if cycles else []), *channels]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(names)
-    latest = 0.0
-    for row in kept:
-        latest = max(latest, row.time_s)
-        cells = [f"{latest:.3f}", row.pose, row.nest, *(f"{value:.9f}" for value in row.q)]
-        cells += _reading_cells(row)
-        if cycles:
-            cells.append("" if row.cycle is None else str(row.cycle))
-        cells += [_number(row.channels.get(name)) for name in channels]
-        writer.writerow(cells)
-    return text.getvalue()
-
-
-def _reading_cells(row: Row) -> list[str]:
-    if row.xyz is None or row.covariance is None:
-        return [""] * 10
-    xx, yy, zz, xy, xz, yz = row.covariance
-    cells = [f"{value:.7f}" for value in row.xyz]
-    cells += [f"{math.sqrt(value):.8f}" for value in (xx, yy, zz)]
-    cells += [f"{value:.6e}" for value in (xy, xz, yz)]
-    return [*cells, _number(row.delay_s)]
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None or not math.isfinite(value) else f"{value:.6g}"
+    others = sorted({name for row in kept for name in row.channels})
+    names = ["delay_s", *(["cycle"] if cycles else []), *others]
+    return {name: np.array([row.get(name) for row in held], dtype=float) for name in names}
 
 
 def _read_after(rows: Sequence[Row], index: int) -> bool:

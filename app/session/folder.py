@@ -3,8 +3,8 @@
 from datetime import UTC, datetime
 from pathlib import Path
 
-from app.files.machines import read_text
 from app.files.site import Site, parse_site
+from app.files.text import read_text
 from app.session.journal import Journal
 from app.session.plan import Plan
 from calib.errors import BadInput

@@ -14,8 +14,8 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from app.files.machines import read_text
 from app.files.site import Site
+from app.files.text import read_text
 from app.session.ownership import state_folder
 from calib.errors import BadInput
 from drivers.errors import ParameterError

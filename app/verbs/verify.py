@@ -9,9 +9,9 @@ import click
 
 from app import answer
 from app.console import run_on_console, unattended
-from app.files.machines import read_text
 from app.files.poses import read_any_poses
 from app.files.site import load_site
+from app.files.text import read_text
 from app.session import Session
 from app.verification import FORMAT, REFERENCE_EVERY, judge_session, verification_plan
 from calib.errors import BadInput

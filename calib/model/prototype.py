@@ -5,10 +5,10 @@ reach before one is built. Physics that the model does not know is not in it; th
 are there for that.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import tomli_w
 
 from calib.arrays import Array
 from calib.errors import BadInput
@@ -16,6 +16,10 @@ from calib.frames import Frame
 from calib.mechanism.description import Machine
 from calib.mechanism.solve import forward
 from calib.poses.reach import PoseSet
+from calib.runs import Header, Run
+
+Visit = tuple[str, str, Array, Array | None]
+"""Label of the pose, nest, commanded q (n,), where the SMR is (3,); None: a move only."""
 
 DWELL_S = 10.0
 DISTANCE = 5.0
@@ -24,21 +28,19 @@ DISTANCE = 5.0
 
 @dataclass(frozen=True, eq=False)
 class Prototype:
-    """Texts of ``run.toml`` and ``points.csv``, and the true parameters (P,) behind them."""
+    """A run, and the true parameters (P,) behind it."""
 
-    run_text: str
-    points_text: str
+    run: Run
     parameters: Array
-    readings: int
 
 
-def nests_of(machine: Machine) -> tuple[dict[str, list[float]], dict[str, list[float]]]:
-    """Three nests on the platform and four around the base, as large as the machine."""
+def nests_of(machine: Machine) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Three nests on the platform and four around the base, (3,) mm, as large as the machine."""
     turns = {"3": np.pi / 2, "4": np.pi * 7 / 6, "5": np.pi * 11 / 6}
     arm, ring = 0.4 * machine.size, 1.1 * machine.size
-    platform = {k: [arm * float(np.cos(a)), arm * float(np.sin(a)), 0.0] for k, a in turns.items()}
+    platform = {k: arm * np.array([np.cos(a), np.sin(a), 0.0]) for k, a in turns.items()}
     base = {
-        f"b{k + 1}": [ring * float(np.cos(a)), ring * float(np.sin(a)), -0.1 * machine.size]
+        f"b{k + 1}": np.array([ring * np.cos(a), ring * np.sin(a), -0.1 * machine.size])
         for k, a in enumerate(np.arange(4) * np.pi / 2)
     }
     return platform, base
@@ -88,37 +90,46 @@ def prototype_run(
     yaw = generator.uniform(-np.pi, np.pi)
     away = DISTANCE * machine.size
     frame = Frame.of((away * np.cos(yaw), away * np.sin(yaw), -0.3 * away, 0.0, 0.0, yaw))
-    rows: list[list[str]] = []
-
-    def add(pose: str, nest: str, command: Array, point: Array | None) -> None:
-        cells = [repr(DWELL_S * len(rows)), pose, nest, *(repr(float(v)) for v in command)]
-        if point is None:
-            cells += [""] * 6
-        else:
-            seen = frame.apply(point) + sigma_mm * generator.standard_normal(3)
-            cells += [*(repr(float(v)) for v in seen), *[repr(sigma_mm)] * 3]
-        rows.append(cells)
-
-    def reference() -> None:
-        for name, place in base.items():
-            add("", name, machine.home_q, np.array(place))
-
-    add("home", "", machine.home_q, None)
-    reference()
+    visits = [("home", "", machine.home_q, None), *_references(machine, base)]
     for _ in range(cycles):
         for nest, place in platform.items():
-            points = real.poses.points(np.array(place)[:, None])
-            for k in range(q.shape[1]):
-                add(f"{k + 1}", nest, q[:, k], points[:, k])
-            reference()
-    commands = [f"q{k + 1}" for k in range(len(machine.actuators))]
-    header = ["time_s", "pose", "nest", *commands, "x", "y", "z", "sx", "sy", "sz"]
-    table = {
-        "format": "pkm-run/1",
-        "machine": named,
-        "title": f"virtual prototype of {machine.name}, {q.shape[1]} poses",
-        "nests": {"platform": platform, "base": base},
-    }
-    text = "\n".join(",".join(cells) for cells in [header, *rows]) + "\n"
-    readings = sum(bool(cells[2]) for cells in rows)
-    return Prototype(tomli_w.dumps(table), text, parameters, readings)
+            points = real.poses.points(place[:, None])
+            visits += [(f"{k + 1}", nest, q[:, k], points[:, k]) for k in range(q.shape[1])]
+            visits += _references(machine, base)
+    title = f"virtual prototype of {machine.name}, {q.shape[1]} poses"
+    header = Header(named, title, platform_nests=platform, base_nests=base)
+    return Prototype(_measured(header, visits, frame, sigma_mm, generator), parameters)
+
+
+def _references(machine: Machine, base: Mapping[str, Array]) -> list[Visit]:
+    return [("", name, machine.home_q, place) for name, place in base.items()]
+
+
+def _measured(
+    header: Header,
+    visits: Sequence[Visit],
+    frame: Frame,
+    sigma_mm: float,
+    generator: np.random.Generator,
+) -> Run:
+    """Read what is visited, in the tracker's ``frame``, with equal noise in all directions."""
+    position = np.full((len(visits), 3), np.nan)
+    for row, (_, _, _, point) in enumerate(visits):
+        if point is not None:
+            position[row] = frame.apply(point) + sigma_mm * generator.standard_normal(3)
+    measured = np.array([point is not None for _, _, _, point in visits])
+    covariance = np.where(measured, sigma_mm**2 * np.eye(3)[:, :, None], np.nan)
+    return Run(
+        header=header,
+        source="prototype",
+        line=np.arange(len(visits)) + 2,
+        time_s=DWELL_S * np.arange(len(visits), dtype=np.float64),
+        pose=tuple(pose for pose, _, _, _ in visits),
+        nest=tuple(nest for _, nest, _, _ in visits),
+        q=np.array([command for _, _, command, _ in visits]).T,
+        measured=measured,
+        position=position.T,
+        covariance=covariance,
+        channels={},
+        left_aside={},
+    )

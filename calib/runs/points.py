@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.errors import BadInput
+from calib.plain_text import plain
 from calib.runs.header import Header, parse_header
 from calib.runs.record import Run
 
@@ -92,7 +93,7 @@ class _Table:
 
     def __init__(self, text: str, source: str) -> None:
         self.source = source
-        text = text.removeprefix("\ufeff")
+        text = plain(text)
         if not text.strip():
             raise BadInput(
                 "the file is empty", place=f"{source}, line 1", remedy="Expected a header and rows"
@@ -115,7 +116,7 @@ class _Table:
         }
 
     def _rows(self, text: str) -> list[tuple[int, Cells]]:
-        lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+        lines = text.split("\n")
         reader = csv.reader((line + "\n" for line in lines), strict=True)
         rows: list[tuple[int, Cells]] = []
         try:

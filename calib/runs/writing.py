@@ -1,6 +1,11 @@
-"""A run as the two texts that ``run.toml`` and ``points.csv`` hold."""
+"""A run as the two texts that ``run.toml`` and ``points.csv`` hold: the only writer of the format.
+
+Described in docs/run-format.md.
+"""
 
 import csv
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -14,18 +19,40 @@ from calib.runs.record import Run
 Array = NDArray[np.float64]
 
 
-def format_run(run: Run) -> tuple[str, str]:
+@dataclass(frozen=True)
+class Digits:
+    """How the numbers of each kind of column are written, as Python's format specifications.
+
+    ``""`` writes as many digits as it takes to read the same number back, bit for bit.
+    ``channels`` is by the channel's name, ``channel`` for those that are not in it.
+    """
+
+    time: str = ""
+    q: str = ""
+    position: str = ""
+    sigma: str = ""
+    covariance: str = ""
+    channel: str = ""
+    channels: Mapping[str, str] = field(default_factory=dict)
+
+
+EXACT = Digits()
+
+
+def format_run(run: Run, digits: Digits = EXACT) -> tuple[str, str]:
     """Write a run.
 
     Returns
     -------
     run_text, points_text : str
-        Texts that :func:`calib.runs.parse_run` reads back to the same numbers, bit for bit.
+        Texts that :func:`calib.runs.parse_run` reads back to the same numbers. Columns that were
+        left aside because they hold text are not among them.
     """
-    return tomli_w.dumps(_header_table(run.header)), _points_text(run)
+    return format_header(run.header), format_points(run, digits)
 
 
-def _header_table(header: Header) -> dict[str, Any]:
+def format_header(header: Header) -> str:
+    """The text of ``run.toml``."""
     table: dict[str, Any] = {"format": FORMAT, "machine": header.machine, "title": header.title}
     if header.tracker:
         table["tracker"] = dict(header.tracker)
@@ -43,7 +70,45 @@ def _header_table(header: Header) -> dict[str, Any]:
             "platform_com": header.load.platform_com.tolist(),
             "payload_com": header.load.payload_com.tolist(),
         }
-    return table
+    return tomli_w.dumps(table)
+
+
+def format_points(run: Run, digits: Digits = EXACT) -> str:
+    """The text of ``points.csv``; covariances are written where any is not zero."""
+    names, columns = _columns(run, digits)
+    target = _Lines()
+    writer = csv.writer(target, lineterminator="\n")
+    writer.writerow(["time_s", "pose", "nest", *names])
+    time = _cells(run.time_s, digits.time)
+    writer.writerows(zip(time, run.pose, run.nest, *columns, strict=True))
+    return "".join(target.lines)
+
+
+def _columns(run: Run, digits: Digits) -> tuple[list[str], list[list[str]]]:
+    """Names and cells of the columns behind time, pose and nest."""
+    names = [f"q{number}" for number in range(1, run.q.shape[0] + 1)]
+    columns = [_cells(column, digits.q) for column in run.q]
+    names += POSITION
+    columns += [_cells(column, digits.position) for column in run.position]
+    names += SIGMAS
+    variances = np.einsum("iin->in", run.covariance)
+    columns += [_cells(column, digits.sigma) for column in np.sqrt(variances)]
+    off_diagonal = run.covariance[[0, 0, 1], [1, 2, 2]]
+    if bool(np.any(np.nan_to_num(off_diagonal) != 0.0)):
+        names += COVARIANCES
+        columns += [_cells(column, digits.covariance) for column in off_diagonal]
+    for name, values in run.channels.items():
+        names.append(name)
+        columns.append(_cells(values, digits.channels.get(name, digits.channel)))
+    return names, columns
+
+
+def _cells(column: Array, digits: str) -> list[str]:
+    finite = np.isfinite(column).tolist()
+    return [
+        format(value, digits) if good else ""
+        for value, good in zip(column.tolist(), finite, strict=True)
+    ]
 
 
 class _Lines:
@@ -54,27 +119,3 @@ class _Lines:
 
     def write(self, line: str) -> None:
         self.lines.append(line)
-
-
-def _cell(value: float) -> str:
-    return "" if np.isnan(value) else repr(float(value))
-
-
-def _points_text(run: Run) -> str:
-    off_diagonal = run.covariance[[0, 0, 1], [1, 2, 2]]
-    with_covariance = bool(np.any(np.nan_to_num(off_diagonal) != 0.0))
-    actuators = [f"q{number}" for number in range(1, run.q.shape[0] + 1)]
-    names = ["time_s", "pose", "nest", *actuators, *POSITION, *SIGMAS]
-    columns: list[Array] = [*run.q, *run.position, *np.sqrt(np.einsum("iin->in", run.covariance))]
-    if with_covariance:
-        names += COVARIANCES
-        columns += list(off_diagonal)
-    names += run.channels
-    columns += list(run.channels.values())
-    target = _Lines()
-    writer = csv.writer(target, lineterminator="\n")
-    writer.writerow(names)
-    for row, (pose, nest) in enumerate(zip(run.pose, run.nest, strict=True)):
-        cells = [_cell(column[row]) for column in columns]
-        writer.writerow([_cell(run.time_s[row]), pose, nest, *cells])
-    return "".join(target.lines)

@@ -1,71 +1,84 @@
-"""A simulated campaign as files: run.toml, points.csv, and apart from them the truth."""
+"""A simulated campaign as files: run.toml, points.csv (docs/run-format.md) and truth."""
 
 import json
 from pathlib import Path
 
 import numpy as np
-import tomli_w
 
+from calib.runs import Digits, Header, Load, Run, covariance_matrices, format_header, format_points
 from mocks.physics.bodies import body_named
+from mocks.physics.pose import Array
+from mocks.simulate.plan import RunPlan
 from mocks.simulate.run import SimulatedRun
 
 
 def run_toml(run: SimulatedRun) -> str:
     """The text of ``run.toml``."""
-    plan = run.plan
-    around = body_named(plan.machine).around
-    load = plan.load or around.load
-    nests = plan.nests or around.platform_nests
-    table: dict[str, object] = {
-        "format": "pkm-run/1",
-        "machine": plan.machine,
-        "title": plan.title or f"{plan.machine}, {len(run.poses)} poses, {len(nests)} nests",
-        "tracker": {"model": "AT901-LR"},
-        "nests": {
-            "platform": {k: list(v) for k, v in around.platform_nests.items()},
-            "base": {k: list(v) for k, v in around.base_nests.items()},
-        },
-        "load": {
-            "gravity": list(load.gravity),
-            "platform_mass_kg": load.platform_mass_kg,
-            "platform_com": list(load.platform_com),
-            "payload_com": list(load.payload_com),
-        },
-    }
-    if plan.controller:
-        table["controller"] = {"parameters": dict(plan.controller)}
-    return tomli_w.dumps(table)
+    return format_header(_header(run))
 
 
 def points_csv(run: SimulatedRun) -> str:
     """The text of ``points.csv``."""
-    mixed = run.plan.noise_mm is None
-    sigma = np.sqrt(run.covariance[:, :3])
-    header = ["time_s", "pose", "nest", *(f"q{i + 1}" for i in range(run.q.shape[1]))]
-    header += ["x", "y", "z", "sx", "sy", "sz", *(["sxy", "sxz", "syz"] if mixed else [])]
-    header += [*(["cycle"] if run.plan.cycles > 1 else []), *run.channels]
-    lines = [",".join(header)]
-    channels = np.column_stack(list(run.channels.values())).tolist()
-    digits = body_named(run.plan.machine).stroke.digits
-    places = [2 if name == "delay_s" else 3 for name in run.channels]
-    rows = zip(
-        run.layout.time.tolist(), run.layout.pose.tolist(), run.layout.labelled.tolist(),
-        run.layout.nest, run.q.tolist(), run.xyz.tolist(), sigma.tolist(),
-        run.covariance[:, 3:].tolist(), channels, run.layout.cycle.tolist(), strict=True,
+    return format_points(as_run(run), digits(run.plan))
+
+
+def digits(plan: RunPlan) -> Digits:
+    """What the instruments of a campaign show of each number."""
+    return Digits(
+        time=".2f", q=f".{body_named(plan.machine).stroke.digits}f", position=".6f", sigma=".6f",
+        covariance=".6e", channel=".3f", channels={"delay_s": ".2f", "cycle": ".0f"},
     )  # fmt: skip
-    for time, pose, labelled, nest, q, xyz, s, cov, values, cycle in rows:
-        label = ("home" if pose < 0 else str(pose + 1)) if labelled else ""
-        cells = [f"{time:.2f}", label, nest, *(f"{v:.{digits}f}" for v in q)]
-        if nest:
-            cells += [f"{v:.6f}" for v in (*xyz, *s)]
-            cells += [f"{v:.6e}" for v in cov] if mixed else []
-        else:
-            cells += [""] * (9 if mixed else 6)
-        if run.plan.cycles > 1:
-            cells.append(str(cycle) if cycle else "")
-        cells += [f"{v:.{n}f}" for v, n in zip(values, places, strict=True)]
-        lines.append(",".join(cells))
-    return "\n".join(lines) + "\n"
+
+
+def as_run(run: SimulatedRun) -> Run:
+    """What was measured, without the truth about it."""
+    rows = run.layout
+    labels = zip(rows.pose.tolist(), rows.labelled.tolist(), strict=True)
+    return Run(
+        header=_header(run),
+        source="simulated",
+        line=np.arange(len(rows.nest)) + 2,
+        time_s=rows.time,
+        pose=tuple(_label(pose) if labelled else "" for pose, labelled in labels),
+        nest=rows.nest,
+        q=run.q.T,
+        measured=rows.reading,
+        position=run.xyz.T,
+        covariance=covariance_matrices(np.where(rows.reading, run.covariance.T, np.nan)),
+        channels=_channels(run),
+        left_aside={},
+    )
+
+
+def _label(pose: int) -> str:
+    return "home" if pose < 0 else str(pose + 1)
+
+
+def _channels(run: SimulatedRun) -> dict[str, Array]:
+    if run.plan.cycles <= 1:
+        return dict(run.channels)
+    cycle = run.layout.cycle
+    return {"cycle": np.where(cycle > 0, cycle, np.nan), **run.channels}
+
+
+def _header(run: SimulatedRun) -> Header:
+    plan, around = run.plan, body_named(run.plan.machine).around
+    load = plan.load or around.load
+    nests = plan.nests or around.platform_nests
+    return Header(
+        machine=plan.machine,
+        title=plan.title or f"{plan.machine}, {len(run.poses)} poses, {len(nests)} nests",
+        tracker={"model": "AT901-LR"},
+        platform_nests={name: np.array(place) for name, place in around.platform_nests.items()},
+        base_nests={name: np.array(place) for name, place in around.base_nests.items()},
+        controller_parameters=dict(plan.controller),
+        load=Load(
+            np.array(load.gravity),
+            load.platform_mass_kg,
+            np.array(load.platform_com),
+            np.array(load.payload_com),
+        ),
+    )
 
 
 def truth_json(run: SimulatedRun) -> str:

@@ -55,14 +55,14 @@ def test_a_file_written_by_hand() -> None:
     ("old", "new", "line", "what"),
     [
         ("z = 221.0", "z = 320.0", 5, 'pose "p01" is out of reach'),
-        ("z = 221.0, ", "", 5, "has no z"),
-        ("z = 220", "w = 220", 6, 'unknown "w"'),
+        ("z = 221.0, ", "", 5, "z is missing"),
+        ("z = 220", "w = 220", 6, 'unknown key "w"'),
         ("rx = 0,", 'rx = "3 mm",', 6, "does not measure"),
         ("rx = 0,", "rx = nan,", 6, "not finite"),
         ('"hexapod"', '"tripod"', 2, 'these poses are for "tripod"'),
         ("rz = 0 }\np02", "rz = 0, q = [1, 2, 3, 4, 5, 6] }\np02", 5, "q of pose"),
         ("pkm-poses/1", "pkm-poses/9", 1, "pkm-poses/9"),
-        ("p02 = {", "p02 = 7 # {", 6, 'pose "p02" is 7'),
+        ("p02 = {", "p02 = 7 # {", 6, "p02 is 7"),
     ],
 )
 def test_faults_are_named_with_their_line(old: str, new: str, line: int, what: str) -> None:

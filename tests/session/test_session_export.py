@@ -1,7 +1,12 @@
 """From rows to points.csv: order, moves without a reading, and a reader that agrees."""
 
-from app.session.export import points_text
+import numpy as np
+
+from app.session.export import DIGITS, run_of
 from app.session.journal import Row
+from calib.runs import Header, format_points, format_run, parse_run
+
+HEADER = Header("hexapod", platform_nests={"3": np.zeros(3), "4": np.ones(3)})
 
 Q0, Q1, Q2 = (230.0,) * 6, (231.0,) * 6, (232.0,) * 6
 
@@ -18,7 +23,7 @@ def row(kind: str, time_s: float, pose: str, q: tuple[float, ...], nest: str = "
 
 
 def lines(rows: list[Row]) -> list[list[str]]:
-    return [line.split(",") for line in points_text(rows, 6).splitlines()]
+    return [line.split(",") for line in format_points(run_of(rows, HEADER, 6), DIGITS).splitlines()]
 
 
 def test_a_move_without_a_reading_stays_and_one_that_was_read_goes() -> None:
@@ -43,3 +48,19 @@ def test_times_never_decrease_and_sigmas_come_from_the_covariance() -> None:
     assert sigma == [0.002, 0.003, 0.004]
     assert float(table[1][header.index("sxy")]) == 1e-7
     assert table[1][header.index("air_temp_C")] == "20.5"
+
+
+def test_what_is_exported_is_read_back() -> None:
+    rows = [row("move", 0.0, "a", Q0), row("move", 1.0, "b", Q1), row("reading", 2.0, "b", Q1, "3")]
+    exported = run_of(rows, HEADER, 6)
+    again = parse_run(*format_run(exported, DIGITS), actuators=6)
+    assert again.pose == ("a", "b") == exported.pose
+    np.testing.assert_allclose(again.covariance, exported.covariance, rtol=1e-6)
+    np.testing.assert_array_equal(again.channels["delay_s"], [np.nan, 2.0])
+
+
+def test_a_session_without_a_row_exports_a_header_alone() -> None:
+    assert lines([]) == [
+        ["time_s", "pose", "nest", "q1", "q2", "q3", "q4", "q5", "q6", "x", "y", "z",
+         "sx", "sy", "sz", "delay_s"]
+    ]  # fmt: skip

@@ -45,7 +45,7 @@ def test_a_fault_is_named_with_its_line(
         parse_site(text.replace(old, new, 1), "site.toml", tmp_path)
     assert what in str(wrong.value)
     if line is not None:
-        assert wrong.value.place.endswith(f"line {line}")
+        assert f"{wrong.value.place},".startswith(f"site.toml, line {line},")
 
 
 def test_a_lab_with_two_base_nests_is_told_why_that_is_too_few(tmp_path: Path) -> None:
