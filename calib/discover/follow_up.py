@@ -14,7 +14,8 @@ from calib.arrays import Array
 from calib.effects.component import Effect
 from calib.identify.fitting import Fit
 from calib.model.columns import whitened_columns
-from calib.model.prediction import Model, State
+from calib.model.prediction import Model
+from calib.model.state import State
 from calib.poses.reach import PoseSet
 from calib.runs.stack import STEP_MM, STEP_RAD, Rows
 from calib.unknown import linear_among

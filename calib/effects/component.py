@@ -38,10 +38,8 @@ class Situation:
 
     Attributes
     ----------
-    position, rotation : (3, N), (3, 3, N)
-        Platform in the base frame.
-    passive : (n_joints, N)
-        Passive coordinates; ``passive_home`` (n_joints,) the same at home.
+    passive_home : (n_joints,)
+        Passive coordinates at home.
     actuator_twists : (n, 6, N)
         Derivative of the platform's twist by each extension, base axes.
     parameter_twists : (P, 6, N)
@@ -56,9 +54,6 @@ class Situation:
     """
 
     rows: Rows
-    position: Array
-    rotation: Array
-    passive: Array
     passive_home: Array
     actuator_twists: Array
     parameter_twists: Array
@@ -74,6 +69,21 @@ class Situation:
     def machine(self) -> Machine:
         """The machine."""
         return self.rows.machine
+
+    @cached_property
+    def position(self) -> Array:
+        """Platform in the base frame, (3, N)."""
+        return self.closed.poses.position[:, self.state_of]
+
+    @cached_property
+    def rotation(self) -> Array:
+        """The same: its axes, (3, 3, N)."""
+        return self.closed.poses.rotation[:, :, self.state_of]
+
+    @cached_property
+    def passive(self) -> Array:
+        """Passive coordinates, (n_joints, N)."""
+        return self.closed.passive[:, self.state_of]
 
     @cached_property
     def whitened_frame(self) -> Array:

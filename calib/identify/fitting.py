@@ -12,7 +12,8 @@ from calib.identify.optimum import optimise
 from calib.identify.readings import BadReading, strays
 from calib.identify.starting import bad_reading, begin
 from calib.mechanism.rigid import euler_rates, to_euler
-from calib.model.prediction import Linearised, Model, State
+from calib.model.prediction import Model
+from calib.model.state import Linearised, State
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,8 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray
 from calib.errors import BadInput
-from calib.model.prediction import Linearised, Model
+from calib.model.prediction import Model
+from calib.model.state import Linearised
 from calib.scaled import Scaled, normal_matrix
 
 MAX_STEPS = 30

@@ -8,7 +8,8 @@ from calib.arrays import Array
 from calib.effects.component import Effect
 from calib.identify.fitting import Fit, fit
 from calib.identify.signatures import EffectColumns, columns_at, effect_columns
-from calib.model.prediction import Model, State
+from calib.model.prediction import Model
+from calib.model.state import State
 from calib.runs.stack import Rows
 
 

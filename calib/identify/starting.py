@@ -9,7 +9,8 @@ from calib.identify.alignment import collinear, misfit, moved_together, robust_a
 from calib.identify.readings import BadReading, wrong_place
 from calib.mechanism.rigid import rotate
 from calib.mechanism.solve import forward
-from calib.model.prediction import Linearised, Model, State
+from calib.model.prediction import Model
+from calib.model.state import Linearised, State
 
 MAJORITY = 0.3
 """Least part of a run's readings that must stand where the machine's nests can be."""

@@ -25,6 +25,7 @@ from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.rigid import cross, exponential, product, rotate
 from calib.mechanism.solve import Configuration, begun_at, forward, home_configuration
 from calib.model.columns import at_trial, change_of, channels_known, whitened_columns
+from calib.model.state import Linearised, State
 from calib.runs.stack import Rows
 from calib.unknown import Unknown, linear_among
 
@@ -34,39 +35,16 @@ SETTLED = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
-class State:
-    """Values of all unknowns, and the configurations that belong to them.
+class _Settled:
+    """A machine that is closed, with the parameters (P,) or (P, M) and effects it was closed with.
 
-    ``parameters`` (P,), ``effects`` one (U,) for each effect, ``frame_rotation`` (3, 3, K) and
-    ``frame_position`` (3, K) the base frame in the tracker frame of each run.
+    ``signatures`` are of every effect with its linear amplitudes (U,).
     """
 
+    closed: Configuration
+    closing: Machine
     parameters: Array
-    effects: tuple[Array, ...]
-    frame_rotation: Array
-    frame_position: Array
-    configuration: Configuration | None = None
-    situation: Situation | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Linearised:
-    """The model near a state.
-
-    ``residual`` (3, N) is measured minus predicted, mm, tracker frame; ``whitened`` (3, N) the
-    same in sigmas; ``jacobian`` (p, 3, N) the whitened derivative of the prediction.
-    """
-
-    state: State
-    residual: Array
-    whitened: Array
-    jacobian: Array
-
-    @property
-    def situation(self) -> Situation:
-        """Where the machine stood."""
-        assert self.state.situation is not None
-        return self.state.situation
+    signatures: list[tuple[Array, Signature]]
 
 
 class Model:
@@ -182,35 +160,24 @@ class Model:
         BadInput
             Naming the reading at which the machine does not close.
         """
-        _, inverse = self._states
-        rows = self.rows
-        closed, parameters, nest, twist = self._settled(state)
-        closing = self._closing(state)
-        jacobians = pose_jacobians(closing, closed, parameters)
-        rotation = closed.poses.rotation[:, :, inverse]
-        arm = rotate(rotation, nest)
-        bent = twist[:3] + cross(twist[3:], arm)
-        base = np.where(rows.on_platform, closed.poses.position[:, inverse] + arm + bent, rows.nest)
-        turn = state.frame_rotation[:, :, rows.run]
-        turned = rotate(turn, base)
-        point = turned + state.frame_position[:, rows.run]
+        rows, settled = self.rows, self._settled(state)
+        closed, (_, inverse) = settled.closed, self._states
+        jacobians = pose_jacobians(settled.closing, closed, settled.parameters)
+        base, turned, point = self._placed(state, settled)
         situation = Situation(
             rows=rows,
-            position=closed.poses.position[:, inverse],
-            rotation=rotation,
-            passive=closed.passive[:, inverse],
             passive_home=home_configuration(self.machine).passive[:, 0],
             actuator_twists=jacobians.actuators[:, :, inverse],
             parameter_twists=jacobians.parameters[:, :, inverse],
             base_point=base,
             point=point,
-            frame_rotation=turn,
+            frame_rotation=state.frame_rotation[:, :, rows.run],
             closed=closed,
             state_of=inverse,
-            parameters=parameters,
-            closing=closing,
+            parameters=settled.parameters,
+            closing=settled.closing,
         )
-        now = replace(state, configuration=closed, situation=situation)
+        now = replace(state, near=situation)
         signatures = self._signatures(now)
         residual = rows.position - point - change_of(signatures, "point", point)
         parts = [through(situation.lever, situation.parameter_twists[self.free])]
@@ -220,28 +187,33 @@ class Model:
 
     def predict(self, state: State) -> Array:
         """What the tracker should read (3, N), mm, without derivatives."""
-        _, inverse = self._states
-        rows = self.rows
-        closed, _, nest, twist = self._settled(state)
-        poses = closed.poses
+        settled = self._settled(state)
+        _, _, point = self._placed(state, settled)
+        return point + change_of(settled.signatures, "point", point)
+
+    def _placed(self, state: State, settled: "_Settled") -> tuple[Array, Array, Array]:
+        """SMR centres (3, N): base frame; the same in the tracker's axes; tracker frame."""
+        rows, poses, (_, inverse) = self.rows, settled.closed.poses, self._states
+        nest = rows.nest + change_of(settled.signatures, "nest", rows.nest)
+        twist = change_of(settled.signatures, "twist", np.zeros((6, rows.count)))
         arm = rotate(poses.rotation[:, :, inverse], nest)
         bent = twist[:3] + cross(twist[3:], arm)
         base = np.where(rows.on_platform, poses.position[:, inverse] + arm + bent, rows.nest)
         turned = rotate(state.frame_rotation[:, :, rows.run], base)
-        point = turned + state.frame_position[:, rows.run]
-        return point + change_of(self._signatures(state), "point", point)
+        return base, turned, turned + state.frame_position[:, rows.run]
 
-    def _settled(self, state: State) -> tuple[Configuration, Array, Array, Array]:
-        """Close the machine where its effects and its pose agree; parameters, nests and twists too.
+    def _settled(self, state: State) -> "_Settled":
+        """Close the machine where its effects and its pose agree.
 
         An effect's extension depends on the pose that it changes, weakly: the two are iterated.
         """
-        rows, (first, inverse) = self.rows, self._states
+        rows, (first, _) = self.rows, self._states
         started = any(np.any(linear) for linear in self._linear(state))
         if state.situation is None and started:
             without = self.effects_at_rest
             begun = self.linearise(replace(state, effects=without)).state
             state = replace(begun, effects=state.effects)
+        closing = self._closing(state)
         moved = np.full_like(rows.extension, np.inf)
         for _ in range(SETTLING_PASSES):
             signatures = self._signatures(state)
@@ -252,27 +224,15 @@ class Model:
                 held = np.repeat(state.parameters[:, None], rows.count, axis=1)
                 parameters = (held + change_of(signatures, "parameters", held))[:, first]
             extension = (rows.extension + change)[:, first]
-            closed = self._closed(extension, parameters, state.configuration, self._closing(state))
+            closed = self._closed(extension, parameters, state.configuration, closing)
             if not shaped and np.max(np.abs(change - moved), initial=0.0) < SETTLED:
                 break
             if state.situation is None or not signatures:
                 break
             moved = change
-            state = replace(
-                state,
-                configuration=closed,
-                situation=replace(
-                    state.situation,
-                    position=closed.poses.position[:, inverse],
-                    rotation=closed.poses.rotation[:, :, inverse],
-                    passive=closed.passive[:, inverse],
-                    closed=closed,
-                    parameters=parameters,
-                    closing=self._closing(state),
-                ),
-            )
-        twist = change_of(signatures, "twist", np.zeros((6, rows.count)))
-        return closed, parameters, rows.nest + change_of(signatures, "nest", rows.nest), twist
+            here = replace(state.situation, closed=closed, parameters=parameters, closing=closing)
+            state = replace(state, near=here)
+        return _Settled(closed, closing, parameters, signatures)
 
     def _closing(self, state: State) -> Machine:
         """The machine as the effects let it close."""

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from calib.arrays import Array
-from calib.model.prediction import Model, State
+from calib.model.prediction import Model
+from calib.model.state import State
 from calib.runs.stack import Rows
 
 
@@ -29,4 +30,4 @@ def drawn_from_prior(model: Model, state: State, generator: np.random.Generator)
     """Draw machine parameters from their Gaussian priors; frames and effects stay."""
     parameters = model.machine.nominal.copy()
     parameters += model.machine.prior_sigma * generator.standard_normal(parameters.size)
-    return replace(state, parameters=parameters, configuration=None, situation=None)
+    return replace(state, parameters=parameters, near=None)

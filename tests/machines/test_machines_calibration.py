@@ -9,7 +9,7 @@ from app.files.machines import load_machine, shipped_machines
 from calib.identify import fit
 from calib.mechanism.rigid import from_euler
 from calib.model import Model
-from calib.model.prediction import State
+from calib.model.state import State
 from calib.model.synthetic import drawn_from_prior, synthetic_rows
 from calib.poses import sample_poses
 from calib.runs import parse_run
