@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from discover_synthetic import POSES, Lab
 
-from calib.evidence import Candidate, Carrier, Variable, diagnose, structure_candidates
+from calib.evidence import Candidate, Response, Variable, diagnose, structure_candidates
 from calib.evidence.bayes import observed
 from calib.evidence.pairs import prefers, rivals
 from calib.evidence.scores import score
@@ -85,7 +85,7 @@ def test_discover_unknown_structure_must_beat_the_effects_by_far():
             lab, generator = Lab(60 + seed), np.random.default_rng(seed)
             shape = lab.one(lab.direction[0], 0)
             known = Candidate("play", (Unknown("play", "mm", 0.02),), shape[None, None])
-            axis = Carrier("axis", lab.one(np.ones(POSES), 0)[None], size=2.0)
+            axis = Response("axis", lab.one(np.ones(POSES), 0)[None], size=2.0)
             anyhow = structure_candidates(
                 [Variable("direction", np.tile(lab.direction[0], 2), (axis,))]
             )

@@ -155,8 +155,8 @@ def test_structure_of_a_mixed_machine_goes_by_the_units_of_its_axes(rows_of):
     for number, axis in enumerate(found.model.machine.axes):
         variable = variables[f"q{number + 1}"]
         assert variable.shortest == axis.shortest
-        assert variable.carriers[0].scale(0) == (axis.unit, axis.usual_error)
-        assert variables["direction"].carriers[0].scale(number) == (axis.unit, axis.usual_error)
+        assert variable.responses[0].scale(0) == (axis.unit, axis.usual_error)
+        assert variables["direction"].responses[0].scale(number) == (axis.unit, axis.usual_error)
 
 
 def test_formulas_of_a_mixed_machine_are_of_one_unit_each(rows_of):
