@@ -14,7 +14,7 @@ from mocks.physics.hidden import Hidden
 from mocks.physics.pose import Array
 from mocks.physics.ptm import geometry
 from mocks.physics.ptm_body import EQUAL, PtmBody
-from mocks.physics.ptm_closure import Standing, close
+from mocks.physics.ptm_closure import Stance, close
 from mocks.physics.ptm_mirror import base_angles, normals, stance
 from mocks.physics.truth import draw_parameters, machine_file
 
@@ -29,7 +29,7 @@ def motors() -> Array:
     return base_angles(normals(tilt, rng.uniform(0.0, 2.0 * np.pi, COUNT)))[:, :2]
 
 
-def closed(errors: dict[str, float], stiffness: Array = EQUAL) -> Standing:
+def closed(errors: dict[str, float], stiffness: Array = EQUAL) -> Stance:
     q = motors()
     return close(geometry(errors), lambda *_: q, np.ones(COUNT), stiffness, stance(q))
 
