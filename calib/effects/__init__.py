@@ -8,7 +8,16 @@ from calib.effects.component import Effect, Signature, Situation, Unknown
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 
-__all__ = ["Effect", "Signature", "Situation", "Unknown", "catalogue", "effect_named", "is_shipped"]
+__all__ = [
+    "Effect",
+    "Signature",
+    "Situation",
+    "Unknown",
+    "catalogue",
+    "effect_named",
+    "is_shipped",
+    "not_defined",
+]
 
 
 @lru_cache(maxsize=1)
@@ -24,6 +33,12 @@ def catalogue(machine: Machine) -> tuple[Effect, ...]:
     return tuple(sorted((e for e in _shipped() if e.applies(machine)), key=lambda e: e.id))
 
 
+def not_defined(machine: Machine) -> dict[str, str]:
+    """Every other shipped effect, and what the machine lacks for it."""
+    reasons = {effect.id: effect.lacking(machine) for effect in _shipped()}
+    return {name: reason for name, reason in sorted(reasons.items()) if reason}
+
+
 def is_shipped(identifier: str) -> bool:
     """Tell whether an identifier is that of a shipped effect, on whatever machine."""
     return any(effect.id == identifier for effect in _shipped())
@@ -34,9 +49,10 @@ def effect_named(identifier: str, machine: Machine) -> Effect:
     here = {effect.id: effect for effect in catalogue(machine)}
     if identifier in here:
         return here[identifier]
+    lacking = not_defined(machine).get(identifier)
     raise BadInput(
-        f"the effect {identifier!r} is not defined for the machine {machine.name}"
-        if is_shipped(identifier)
+        f"the effect {identifier!r} is not defined for the machine {machine.name}: {lacking}"
+        if lacking
         else f"unknown effect {identifier!r}",
         remedy=f"Known for {machine.name}: {', '.join(here)}",
     )

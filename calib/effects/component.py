@@ -14,7 +14,7 @@ itself is the sum of unknown times derivative over the linear unknowns. An effec
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -24,7 +24,7 @@ import numpy as np
 from calib.arrays import Array, IntArray
 from calib.effects.lever import lever_of, through, whitened_frame
 from calib.mechanism.description import Machine
-from calib.mechanism.jacobian import pose_jacobians
+from calib.mechanism.jacobian import element_twists
 from calib.mechanism.solve import Configuration
 from calib.runs.stack import Rows
 from calib.unknown import Unknown as Unknown
@@ -101,29 +101,10 @@ class Situation:
         """Whitened derivative (n, 3, N) of the readings by each extension."""
         return through(self.lever, self.actuator_twists)
 
-    def error_twists(self, name: str) -> Array:
-        """Twist (6, N) of the platform per unit of a parameter, hidden error sources included."""
-        machine = self.closing.detailed or self.closing
-        twists: Array = self._detailed[machine.index(name)]
-        return twists[:, self.state_of]
-
-    @cached_property
-    def _detailed(self) -> Array:
-        """Twists (P', 6, M) by every parameter of the machine in detail."""
-        machine = self.closing.detailed
-        if machine is None:
-            answer: Array = pose_jacobians(self.closing, self.closed, self.parameters).parameters
-            return answer
-        held = np.zeros((len(machine.parameters), *self.parameters.shape[1:]))
-        held += machine.nominal.reshape(-1, *[1] * (self.parameters.ndim - 1))
-        held[: self.parameters.shape[0]] = self.parameters
-        detailed: Array = pose_jacobians(machine, self.closed, held).parameters
-        return detailed
-
-    @cached_property
-    def length(self) -> Array:
-        """Nominal length of each actuator (reference + s), shape (n, N), mm."""
-        return self.machine.coordinates(self.rows.extension)
+    def element_twists(self, places: Sequence[tuple[int, int]]) -> Array:
+        """Twist (len(places), 6, N) of the platform per mm or rad of (limb, element) each."""
+        twists: Array = element_twists(self.closing, self.closed, self.parameters, places)
+        return twists[:, :, self.state_of]
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,9 +146,13 @@ class Effect(ABC):
     channels: tuple[str, ...] = ()
     depends: tuple[str, ...] = ()
 
+    def lacking(self, machine: Machine) -> str:
+        """Say what the machine file lacks for the effect to be defined; empty if it is."""
+        return ""
+
     def applies(self, machine: Machine) -> bool:
         """Tell whether the effect is defined for this machine."""
-        return bool(machine.actuators)
+        return not self.lacking(machine)
 
     def unavailable(self, rows: Rows) -> str:
         """Say why these readings cannot show the effect; empty if they can."""

@@ -2,8 +2,11 @@
 
 Virtual work gives F_i = w . t_i with the weight's wrench w and the platform's twist t_i per unit
 of extension i. The same expression is the motor torque Q_i = -dV/dq_i of a machine with rotary
-actuators, whose motors yield by dq_i = c Q_i. Over-constrained machines whose rods are springs
-have a definition of their own.
+actuators, whose motors yield by dq_i = c Q_i.
+
+Where the machine file says that rods are springs (trait ``yields``), the actuators hold and the
+platform gives way by the compliance of the elastic closure itself: rods are springs of c, other
+compliances of the closure are in the file's proportion to them.
 """
 
 import numpy as np
@@ -11,6 +14,8 @@ import numpy as np
 from calib.arrays import Array
 from calib.effects.component import Effect, Signature, Situation, Unknown, alone
 from calib.mechanism.axes import units_of
+from calib.mechanism.closure import Closure, Standing
+from calib.mechanism.compiled import compile_machine
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import cross, rotate
 from calib.runs.stack import Rows
@@ -46,18 +51,18 @@ def weight_wrench(rows: Rows, rotation: Array) -> tuple[Array, Array]:
 
 
 class GravitySag(Effect):
-    """One compliance for all actuators."""
+    """One compliance for everything that yields."""
 
     id = "gravity-sag"
     kind = "machine"
-    says = "the legs give way under the weight of platform and payload"
+    says = "legs, rods or drives give way under the weight of platform and payload"
     depends = ("payload_kg",)
 
-    def applies(self, machine: Machine) -> bool:
-        """Where the actuators yield; a tripod's rods do, by a definition of their own."""
-        detailed = machine.detailed or machine
-        rods = any(parameter.name.endswith(".dh1") for parameter in detailed.parameters)
-        return bool(machine.actuators) and not rods
+    def lacking(self, machine: Machine) -> str:
+        """Springs must be part of an elastic closure; actuators yield on any machine."""
+        if _spring_compliance(machine) and not compile_machine(machine).redundant:
+            return "its springs carry no load that limbs share (trait yields)"
+        return ""
 
     def unavailable(self, rows: Rows) -> str:
         """Without [load] there is no weight to speak of."""
@@ -73,6 +78,8 @@ class GravitySag(Effect):
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``gravity-sag.c``, mm/N or rad/(N mm); ``.c_linear`` and ``.c_rotary`` where both are."""
+        if _spring_compliance(rows.machine):
+            return (Unknown("gravity-sag.c", "mm/N", 1e-4),)
         axes = rows.machine.axes
         units = units_of(axes)
         first = [axes[own[0]] for own in units.values()]
@@ -87,15 +94,54 @@ class GravitySag(Effect):
 
     def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
         """Linear or rotary actuators alone."""
-        return alone(len(units_of(rows.machine.axes)))
+        count = len(self.unknowns(rows))
+        return alone(count) if count > 1 else ()
 
     def signature(self, situation: Situation, values: Array) -> Signature:
-        """Actuator forces."""
+        """Actuator forces; or what the platform gives way for springs of 1 mm/N."""
+        spring = _spring_compliance(situation.machine)
+        if spring:
+            return Signature(twist=_given_way(situation)[None] / spring)
         forces, units = actuator_forces(situation), units_of(situation.machine.axes)
         shape = np.zeros((len(units), *forces.shape))
         for number, own in enumerate(units.values()):
             shape[number, own] = forces[own]
         return Signature(extension=shape)
+
+
+def _spring_compliance(machine: Machine) -> float:
+    """Compliance of the rods that are springs in the machine file, mm/N; 0 without any."""
+    named = [
+        limb.elements[limb.traits.yields].compliance
+        for limb in machine.limbs
+        if limb.traits.yields is not None
+    ]
+    return max(named, default=0.0)
+
+
+def _given_way(situation: Situation) -> Array:
+    """Twist (6, N) of the platform under the weight, by the closure's own compliance."""
+    size = situation.machine.size
+    force, moment = weight_wrench(situation.rows, situation.rotation)
+    wrench = np.concatenate([force * size, moment])
+    compliance = _platform_compliance(situation)[:, :, situation.state_of]
+    twist = np.einsum("ijn,jn->in", compliance, wrench)
+    twist[:3] *= size
+    return np.asarray(twist)
+
+
+def _platform_compliance(situation: Situation) -> Array:
+    """Inverse of A^T A (6, 6, M), A the closure's rows whitened by their flexibility.
+
+    In the engine's scaled twists (translations as parts of the machine's size).
+    """
+    closed, held = situation.closed, situation.parameters
+    columns = held[:, None] if held.ndim == 1 else held
+    closure = Closure(situation.closing, columns, closed.extension, Standing.of(closed))
+    rows, _ = closure.rows()
+    stacked = np.moveaxis(rows, -1, 0)
+    inverse = np.linalg.inv(np.swapaxes(stacked, 1, 2) @ stacked)
+    return np.asarray(np.moveaxis(inverse, 0, -1))
 
 
 EFFECTS = (GravitySag(),)

@@ -1,78 +1,107 @@
 """The two axes of a universal joint do not meet: for machine files that let them meet.
 
-A leg of length l stands between C = B + L_B n_B and D = P + L_P n_P (docs/papers.md), while
-the file puts it between B and P. At the same pose the file's leg is longer by |P - B| - |D - C|,
-which with a = D - C, b = L_B n_B - L_P n_P equals b . (2 a + b) / (|a + b| + |a|): exact, and
-linear in L_B and L_P once the directions are known. n_B is the direction of D - B in the plane
-across the joint's first axis, n_P that of C - P.
+A leg of length l stands between C = B + L_B n_B and D = P + L_P n_P, while the file puts it
+between B and P. At the same pose the file's leg is longer by |P - B| - |D - C|, which with
+a = D - C, b = L_B n_B - L_P n_P equals b . (2 a + b) / (|a + b| + |a|): exact, and linear in L_B
+and L_P once the directions are known. n_B is the direction of D - B in the plane across the
+joint's first axis, n_P that of C - P (Han et al. 2020; docs/papers.md).
 """
+
+from collections.abc import Iterator
 
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown, alone
-from calib.effects.limb_frames import frames_along, joint_index
+from calib.effects.component import Effect, Signature, Situation, Unknown
+from calib.effects.legs import Leg, arm_between, leg_of
+from calib.effects.lengthened import Change, lengthened
+from calib.effects.limb_frames import frames_along, limb_labels, place_on_platform
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import rotate
+from calib.mechanism.traits import UniversalJoint
 from calib.runs.stack import Rows
 
 PASSES = 4
+ARMS = {"base": "L_B", "platform": "L_P"}
 
 
 class JointOffset(Effect):
-    """An arm at the base and one at the platform for each leg."""
+    """An arm for each universal joint of each leg."""
 
     id = "joint-offset"
     kind = "machine"
     says = "the two axes of a universal joint do not meet"
 
-    def applies(self, machine: Machine) -> bool:
-        """Where legs stand between universal joints and the file has no L_B, L_P."""
-        names = {parameter.name for parameter in machine.parameters}
-        return len(machine.limbs) == len(machine.actuators) and all(
-            joint_index(machine, limb, "psi_B") is not None
-            and joint_index(machine, limb, "psi_P") is not None
-            and f"{limb.name}.L_B" not in names
-            for limb in machine.limbs
-        )
+    def lacking(self, machine: Machine) -> str:
+        """Legs must stand on universal joints whose axes meet in the file."""
+        if list(_joints(machine)):
+            return ""
+        if any(limb.traits.base_joint or limb.traits.platform_joint for limb in machine.limbs):
+            return "its file knows how far the axes of its universal joints are apart"
+        return "its file names no leg on a universal joint (traits base_joint, platform_joint)"
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``joint-offset.leg1.L_B``, ``.L_P`` ..., mm."""
+        labels = limb_labels(rows.machine)
         return tuple(
-            Unknown(f"joint-offset.{limb.name}.{arm}", "mm", 5.0)
-            for limb in rows.machine.limbs
-            for arm in ("L_B", "L_P")
+            Unknown(f"joint-offset.{labels[leg.limb]}.{ARMS[body]}", "mm", 5.0)
+            for leg, body, _ in _joints(rows.machine)
         )
 
     def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
         """Each leg alone."""
-        return alone(len(rows.machine.actuators), 2)
+        limbs = [leg.limb for leg, _, _ in _joints(rows.machine)]
+        return tuple(
+            tuple(k for k, own in enumerate(limbs) if own == limb) for limb in dict.fromkeys(limbs)
+        )
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """Difference of the legs' lengths, per arm."""
-        shape = np.zeros((2 * len(situation.machine.limbs), *situation.rows.extension.shape))
-        for leg, limb in enumerate(situation.machine.limbs):
-            frames = frames_along(situation, limb)
-            B, across_B = frames["psi_B"][0], frames["psi_B"][1][:, 0]
-            across_P = frames["psi_P"][1][:, 0]
-            P = situation.position + rotate(situation.rotation, _platform_joint(situation, leg))
-            L_B, L_P = values[2 * leg], values[2 * leg + 1]
-            C, D = B, P
-            for _ in range(PASSES):
-                n_B, n_P = _direction(D - B, across_B), _direction(C - P, across_P)
-                C, D = B + L_B * n_B, P + L_P * n_P
-            whole, leg_vector = P - B, D - C
-            middle = (whole + leg_vector) / (_norm(whole) + _norm(leg_vector))
-            shape[2 * leg, leg] = np.sum(n_B * middle, axis=0)
-            shape[2 * leg + 1, leg] = -np.sum(n_P * middle, axis=0)
-        return Signature(extension=shape)
+        joints = list(_joints(situation.machine))
+        changes = []
+        for limb in dict.fromkeys(leg.limb for leg, _, _ in joints):
+            own = {body: k for k, (leg, body, _) in enumerate(joints) if leg.limb == limb}
+            leg = joints[next(iter(own.values()))][0]
+            shapes = _shapes(situation, leg, {body: float(values[k]) for body, k in own.items()})
+            for body, k in own.items():
+                changes.append(Change(k, limb, leg.length, leg.sense * shapes[body]))
+        return lengthened(situation, changes, len(joints), closed_anew=True)
 
 
-def _platform_joint(situation: Situation, leg: int) -> Array:
-    """Nominal centre (3, 1) of a leg's platform joint, platform frame."""
-    machine = situation.machine
-    name = machine.limbs[leg].name
-    return machine.nominal[[machine.index(f"{name}.P_{axis}") for axis in "xyz"]][:, None]
+def _joints(machine: Machine) -> Iterator[tuple[Leg, str, UniversalJoint]]:
+    """Legs, and those universal joints at their ends whose axes meet."""
+    for number, limb in enumerate(machine.limbs):
+        leg = leg_of(machine, number)
+        for body, joint in (("base", limb.traits.base_joint),
+                            ("platform", limb.traits.platform_joint)):  # fmt: skip
+            if leg is not None and joint is not None and not arm_between(machine, limb, joint):
+                yield leg, body, joint
+
+
+def _shapes(situation: Situation, leg: Leg, arms: dict[str, float]) -> dict[str, Array]:
+    """How much longer (N,) the file's leg is per mm of each arm, for arms of these lengths."""
+    limb = situation.machine.limbs[leg.limb]
+    frames, traits = frames_along(situation, limb), limb.traits
+    base, platform = traits.base_joint, traits.platform_joint
+    B = frames[leg.foot if base is None else base.first][0]
+    joint = leg.head if platform is None else platform.first
+    on_platform = place_on_platform(situation.machine, limb, joint)
+    P = situation.position + rotate(situation.rotation, on_platform)
+    across = {
+        body: frames[own.first][1][:, limb.elements[own.first].axis]
+        for body, own in (("base", base), ("platform", platform))
+        if own is not None and body in arms
+    }
+    nothing = np.zeros_like(B)
+    n_B = n_P = nothing
+    C, D = B, P
+    for _ in range(PASSES):
+        n_B = _direction(D - B, across["base"]) if "base" in arms else nothing
+        n_P = _direction(C - P, across["platform"]) if "platform" in arms else nothing
+        C, D = B + arms.get("base", 0.0) * n_B, P + arms.get("platform", 0.0) * n_P
+    whole, leg_vector = P - B, D - C
+    middle = (whole + leg_vector) / (_norm(whole) + _norm(leg_vector))
+    return {"base": np.sum(n_B * middle, axis=0), "platform": -np.sum(n_P * middle, axis=0)}
 
 
 def _direction(vector: Array, across: Array) -> Array:

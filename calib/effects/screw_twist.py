@@ -1,16 +1,15 @@
 """An unguided screw turns about its own axis as the joints swing, and so changes length.
 
-extension_i = L / (2 pi) (twist_i - twist_i at home). The twist is the passive coordinate of that
-name in the machine file: the turn about the leg (base to platform, right-handed) from the
-base-side second axis to the platform-side one.
+extension_i = L / (2 pi) (twist_i - twist_i at home). The machine file says which joint the twist is
+(trait ``screw``): the turn about the leg (base to platform, right-handed) from the base-side second
+axis to the platform-side one.
 """
 
 import numpy as np
 
 from calib.arrays import Array
 from calib.effects.component import Effect, Signature, Situation, Unknown
-from calib.effects.limb_frames import joint_index
-from calib.mechanism.description import Machine
+from calib.mechanism.description import Limb, Machine, Term
 from calib.runs.stack import Rows
 
 
@@ -21,11 +20,11 @@ class ScrewTwist(Effect):
     kind = "machine"
     says = "an unguided screw turns about its own axis as the joints swing, and changes length"
 
-    def applies(self, machine: Machine) -> bool:
-        """Where every limb has an actuator of its own and a passive joint called twist."""
-        return len(machine.limbs) == len(machine.actuators) and all(
-            joint_index(machine, limb, "twist") is not None for limb in machine.limbs
-        )
+    def lacking(self, machine: Machine) -> str:
+        """Some leg must be a screw without a guide."""
+        if any(limb.traits.screw is not None for limb in machine.limbs):
+            return ""
+        return "its file names no screw without a guide (trait screw)"
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``screw-twist.L``, mm per turn."""
@@ -33,21 +32,21 @@ class ScrewTwist(Effect):
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """Turns from home."""
-        joints = [joint_index(situation.machine, limb, "twist") for limb in situation.machine.limbs]
-        index = np.array(joints, dtype=np.intp)
-        turned = situation.passive[index] - situation.passive_home[index][:, None]
-        shape = np.zeros((1, *turned.shape))
-        for limb, actuator in enumerate(_actuators(situation.machine)):
-            shape[0, actuator] = turned[limb] / (2.0 * np.pi)
+        shape = np.zeros((1, *situation.rows.extension.shape))
+        for limb in situation.machine.limbs:
+            if limb.traits.screw is None:
+                continue
+            turn = _term(limb, "passive", limb.traits.screw)
+            drive = _term(limb, "actuator")
+            turned = situation.passive[turn.index] - situation.passive_home[turn.index]
+            shape[0, drive.index] = turn.factor / drive.factor * turned / (2.0 * np.pi)
         return Signature(extension=shape)
 
 
-def _actuators(machine: Machine) -> list[int]:
-    """Index of the actuator in each limb."""
-    return [
-        next(t.index for e in limb.elements for t in e.terms if t.kind == "actuator")
-        for limb in machine.limbs
-    ]
+def _term(limb: Limb, kind: str, element: int | None = None) -> Term:
+    """The joint, or the actuator, of one element of a limb, or of whichever has one."""
+    elements = limb.elements if element is None else limb.elements[element : element + 1]
+    return next(term for e in elements for term in e.terms if term.kind == kind)
 
 
 EFFECTS = (ScrewTwist(),)

@@ -10,6 +10,7 @@ a local axis::
     Ty:5mm/turn*q            the same by a motor that turns, behind a screw
     Uxz  Sxyz  Cz            universal, spherical and cylindrical joints, spelled out in order
     Rz:?a ... Rz:-?a         two joints that share one passive coordinate (a parallelogram)
+    upper=tz:300             any element may have a name: traits call it by that
     ctx:0.001  crz:1e-8      compliance at this place, mm/N or rad/(N mm)
 
 A value is a sum of products: ``-2*e+15d`` (``calib.mechanism.chain_value``).
@@ -21,6 +22,7 @@ from dataclasses import dataclass, field
 from calib.errors import BadInput
 from calib.mechanism.chain_value import Meant, Resolve, read_value
 from calib.mechanism.description import Element, PassiveJoint, Term
+from calib.mechanism.traits import Part
 
 _TOKEN = re.compile(
     r"(?:(?P<name>[A-Za-z]\w*)=)?"
@@ -30,6 +32,18 @@ _TOKEN = re.compile(
 )
 _AXISLESS = re.compile(r"(?:[A-Za-z]\w*=)?[RTUSC](?:\(.*)?(?::.*)?")
 _EXPECTED_AXES = {"U": 2, "S": 3}
+
+
+@dataclass
+class ChainNames:
+    """Names of one chain: those of its elements, and those that stand in their values."""
+
+    elements: dict[str, list[int]] = field(default_factory=dict)
+    values: dict[str, list[Part]] = field(default_factory=dict)
+
+    def all(self) -> list[str]:
+        """Every name."""
+        return [*self.elements, *self.values]
 
 
 @dataclass
@@ -43,6 +57,7 @@ class ChainReader:
     elements: list[Element] = field(default_factory=list)
     joints: list[PassiveJoint] = field(default_factory=list)
     shared: dict[str, int] = field(default_factory=dict)
+    names: ChainNames = field(default_factory=ChainNames)
 
     def read(self, text: str) -> None:
         """Append the elements of ``text``; raises :class:`BadInput` naming the token."""
@@ -81,6 +96,8 @@ class ChainReader:
             name = found["name"] or ""
             label = name if len(parts) == 1 or not name else f"{name}.{part}{axis}"
             start = starts[k] if k < len(starts) else ""
+            for called in dict.fromkeys(n for n in (name, label) if n):
+                self.names.elements.setdefault(called, []).append(len(self.elements))
             self._append(token, part, "xyz".index(axis), label, start, value)
 
     def _append(
@@ -122,7 +139,9 @@ class ChainReader:
 
     def _passive(self, turns: bool, axis: int, name: str, start: str, token: str) -> None:
         unit = "rad" if turns else "mm"
-        value = self._value(start, unit, token, joint=False, turns=turns)[0] if start else 0.0
+        value = 0.0
+        if start:
+            value = self._value(start, unit, token, joint=False, turns=turns, named=False)[0]
         label = name or f"joint{len(self.joints) + 1}"
         limits = self.limits.pop(label, (-float("inf"), float("inf")))
         term = Term("passive", self.first_joint + len(self.joints), 1.0)
@@ -130,14 +149,18 @@ class ChainReader:
         self.elements.append(Element(turns, axis, 0.0, (term,)))
 
     def _value(
-        self, text: str, unit: str, token: str, *, joint: bool, turns: bool
+        self, text: str, unit: str, token: str, *, joint: bool, turns: bool, named: bool = True
     ) -> tuple[float, list[Term]]:
         def meant(name: str, place: str) -> Meant:
             if name.startswith("?") and joint:
                 return Meant(self._shared(name[1:], turns), "rad" if turns else "mm")
             return self.resolve(name, place)
 
-        return read_value(text, unit, f'{self.place}, "{token}"', meant)
+        value = read_value(text, unit, f'{self.place}, "{token}"', meant)
+        if named:
+            for name, factor in value.names:
+                self.names.values.setdefault(name, []).append(Part(len(self.elements), factor))
+        return value.constant, value.terms
 
     def _shared(self, name: str, turns: bool) -> Term:
         if name not in self.shared:

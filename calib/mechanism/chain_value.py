@@ -30,21 +30,32 @@ Resolve = Callable[[str, str], Meant]
 """(name, place) -> what it means; raises BadInput for a name that means nothing."""
 
 
-def read_value(text: str, unit: str, place: str, resolve: Resolve) -> tuple[float, list[Term]]:
-    """Constant and terms of a value in ``unit`` ("mm" or "rad"; "" takes any).
+@dataclass(frozen=True)
+class Value:
+    """A sum: its constant, its terms, and the names in it with what each is multiplied by."""
+
+    constant: float
+    terms: list[Term]
+    names: list[tuple[str, float]]
+
+
+def read_value(text: str, unit: str, place: str, resolve: Resolve) -> Value:
+    """A value in ``unit`` ("mm" or "rad"; "" takes any).
 
     Raises
     ------
     BadInput
         For text that is no sum of products, and for products that are in another unit.
     """
-    constant, terms, end = 0.0, [], 0
+    constant, terms, names, end = 0.0, [], list[tuple[str, float]](), 0
     for found in _PRODUCT.finditer(text):
         if found.start() != end or (end and not found[1]):
             break
         end = found.end()
-        factor, variable, own = _product(found[2], place, resolve)
-        factor = -factor if found[1] == "-" else factor
+        factor, variable, own, named = _product(found[2], place, resolve)
+        sign = -1.0 if found[1] == "-" else 1.0
+        factor *= sign
+        names += [(name, sign * rest) for name, rest in named]
         if own != unit and unit and not (variable is None and not own):
             raise _mismatch(found[2], variable, own, unit, place)
         if variable is None:
@@ -57,21 +68,26 @@ def read_value(text: str, unit: str, place: str, resolve: Resolve) -> tuple[floa
             place=place,
             remedy="A value is a sum of products: q+L0, -P_x, 2*e, 15d, 5mm/turn*q.",
         )
-    return constant, terms
+    return Value(constant, terms, names)
 
 
-def _product(text: str, place: str, resolve: Resolve) -> tuple[float, Term | None, str]:
-    """Number, variable and unit of a product."""
+def _product(
+    text: str, place: str, resolve: Resolve
+) -> tuple[float, Term | None, str, list[tuple[str, float]]]:
+    """Number, variable and unit of a product, and its names with the rest of it."""
     factor, variable, units = 1.0, None, []
+    named: list[tuple[str, float]] = []
     for name in re.findall(_FACTOR, text):
         if is_quantity(name):
             number, unit = measured(name, place)
             meant = Meant(number, unit)
         else:
             meant = resolve(name, place)
+            named.append((name, factor))
         units.append(meant.unit)
         if isinstance(meant.value, float):
             factor *= meant.value
+            named = [(n, r if n == name else r * meant.value) for n, r in named]
         elif variable is None:
             variable = meant.value
         else:
@@ -80,7 +96,7 @@ def _product(text: str, place: str, resolve: Resolve) -> tuple[float, Term | Non
                 place=place,
                 remedy="A product holds one parameter, actuator or joint; the rest are numbers.",
             )
-    return factor, variable, product_unit(units)
+    return factor, variable, product_unit(units), named
 
 
 def _mismatch(text: str, variable: Term | None, own: str, unit: str, place: str) -> BadInput:

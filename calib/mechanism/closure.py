@@ -21,7 +21,6 @@ import numpy as np
 
 from calib.arrays import Array, Numbers, Selection
 from calib.mechanism.compiled import (
-    ArrayElement,
     Compiled,
     Group,
     compile_machine,
@@ -99,7 +98,7 @@ class LinearLimbs:
     """A group of limbs, linearised: passive twists factorised, wrenches, residual."""
 
     group: Group
-    screws: tuple[Screw | None, ...]
+    screws: tuple[Screw, ...]
     factors: Reflectors
     wrenches: Numbers
     """W (6, rows, L, N)."""
@@ -135,22 +134,15 @@ def _quarter_turns(columns: list[Numbers], axis: int, count: int) -> list[Number
     return turned
 
 
-def _needs_screw(element: ArrayElement) -> bool:
-    return bool(element.terms) or element.compliance is not None
-
-
 def sweep(
     group: Group, parameters: Numbers, extension: Numbers, state: Standing, strain: Numbers
-) -> tuple[Numbers, Numbers, tuple[Screw | None, ...]]:
+) -> tuple[Numbers, Numbers, tuple[Screw, ...]]:
     """Walk along the chains of a group: end position (3, L, N), rotation (3, 3, L, N), screws."""
     columns = [np.eye(3)[j].reshape(3, 1, 1) for j in range(3)]
     point: Numbers = np.zeros((3, 1, 1))
-    screws: list[Screw | None] = []
+    screws: list[Screw] = []
     for k, element in enumerate(group.elements):
-        if _needs_screw(element):
-            screws.append(Screw(columns[element.axis], point if element.turns else None))
-        else:
-            screws.append(None)
+        screws.append(Screw(columns[element.axis], point if element.turns else None))
         if element.compliance is not None:
             value: Numbers | None = strain[group.compliant.index(k)]
         else:
@@ -170,7 +162,7 @@ def sweep(
 
 def _twists(
     group: Group,
-    screws: tuple[Screw | None, ...],
+    screws: tuple[Screw, ...],
     columns: list[tuple[tuple[int, Array | None], ...]],
     origin: Numbers,
     size: float,
@@ -181,7 +173,6 @@ def _twists(
     for j, column in enumerate(columns):
         for i, (k, factor) in enumerate(column):
             screw = screws[k]
-            assert screw is not None
             if i == 0 and factor is None:
                 screw.twist(origin, size, out[:, j])
                 continue
@@ -249,13 +240,13 @@ class Closure:
             weights = self._weights(group, screws, W, triangle)
         return LinearLimbs(group, screws, factors, W, gap, residual, triangle, weights)
 
-    def _compliant_twists(self, group: Group, screws: tuple[Screw | None, ...]) -> Numbers:
+    def _compliant_twists(self, group: Group, screws: tuple[Screw, ...]) -> Numbers:
         columns: list[tuple[tuple[int, Array | None], ...]] = [
             ((k, None),) for k in group.compliant
         ]
         return _twists(group, screws, columns, self.origin, self.machine.size, self.dtype)
 
-    def _flexibility(self, group: Group, screws: tuple[Screw | None, ...], W: Numbers) -> Numbers:
+    def _flexibility(self, group: Group, screws: tuple[Screw, ...], W: Numbers) -> Numbers:
         """G = W^T C W (rows, rows, L, N): how far the limb yields along its own wrenches."""
         yielding = self._compliant_twists(group, screws)
         along = np.einsum("icln,irln->crln", yielding, W)
@@ -263,7 +254,7 @@ class Closure:
         return G
 
     def _weights(
-        self, group: Group, screws: tuple[Screw | None, ...], W: Numbers, triangle: Numbers
+        self, group: Group, screws: tuple[Screw, ...], W: Numbers, triangle: Numbers
     ) -> RowWeights:
         def answers(elements: tuple[int, ...]) -> Numbers:
             columns: list[tuple[tuple[int, Array | None], ...]] = [((k, None),) for k in elements]
@@ -285,12 +276,9 @@ class Closure:
             return RowWeights(triangle, driven_rows(driven))
         return RowWeights(triangle, None)
 
-    def _area(self, screws: tuple[Screw | None, ...], spans: tuple[int, int, int]) -> Numbers:
+    def _area(self, screws: tuple[Screw, ...], spans: tuple[int, int, int]) -> Numbers:
         """Area (L, N) that the velocities of two joints span at a third, over size squared."""
         first, second, at = (screws[k] for k in spans)
-        assert first is not None
-        assert second is not None
-        assert at is not None
         normal = cross(first.velocity(at), second.velocity(at)) / self.machine.size**2
         area: Numbers = np.sqrt(np.einsum("iln,iln->ln", normal, normal))
         return area
@@ -333,7 +321,7 @@ class Closure:
         part = np.empty_like(limb.gap)
         for element, screw in zip(limb.group.elements, limb.screws, strict=True):
             for term in element.terms:
-                if term.kind != "actuator" or screw is None:
+                if term.kind != "actuator":
                     continue
                 screw.twist(self.origin, self.machine.size, part)
                 share = ds[term.index]
@@ -362,8 +350,21 @@ class Closure:
                         yield int(variable), rows, answer[:, i]
             offset += limb.row_count
 
-    def _answer(self, limb: LinearLimbs, screw: Screw | None) -> Numbers:
-        assert screw is not None
+    def column(self, limb: int, element: int) -> tuple[slice, Numbers]:
+        """Rows, and their answer (len(rows), N), to one element of one limb, fixed ones included.
+
+        As :meth:`columns`; without rows where the limb's group carries no wrench.
+        """
+        offset = 0
+        for group in self.limbs:
+            if limb in group.group.limbs:
+                i = group.group.limbs.index(limb)
+                answer = self._answer(group, group.screws[element])[:, i]
+                return slice(offset + i, offset + group.row_count, group.group.count), answer
+            offset += group.row_count
+        raise IndexError(limb)
+
+    def _answer(self, limb: LinearLimbs, screw: Screw) -> Numbers:
         W, size = limb.wrenches, self.machine.size
         answer: Numbers
         if screw.point is None:

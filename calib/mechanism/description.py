@@ -16,6 +16,7 @@ import numpy as np
 from calib.arrays import Array, BoolArray
 from calib.errors import BadInput
 from calib.mechanism.axes import Axis, axes_of
+from calib.mechanism.traits import NO_TRAITS, Traits
 
 Kind = Literal["parameter", "actuator", "passive"]
 
@@ -114,6 +115,8 @@ class Limb:
     published_rows: tuple[PublishedRow, ...] | None = None
     """Rows weighted as somebody published them; None for the weights that follow from the
     compliances."""
+    traits: Traits = NO_TRAITS
+    """What its parts are: legs, universal joints, screws, sides of a parallelogram."""
 
 
 @dataclass(frozen=True)
@@ -161,6 +164,8 @@ class Machine:
     detailed: "Machine | None" = None
     """The same machine with its hidden parameters, after those of this one; None without any.
     The two have the same joints: a configuration of one is a configuration of the other."""
+    traits_stated: bool = True
+    """Whether the file says what its parts are; else it was told by their names, if at all."""
 
     @cached_property
     def nominal(self) -> Array:

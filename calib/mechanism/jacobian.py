@@ -5,6 +5,7 @@ For a machine without redundancy this is exact; an elastic closure neglects the 
 wrenches with the strain, of relative order strain / length.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,23 +42,58 @@ def pose_jacobians(
     parameters : array, shape (P,) or (P, N), optional
         Nominal if not given.
     """
-    values = machine.nominal if parameters is None else np.asarray(parameters)
-    held = values[:, None] if values.ndim == 1 else values
     count = configuration.count
-    dtype = np.result_type(held, configuration.poses.position)
+    dtype = np.result_type(_held(machine, parameters), configuration.poses.position)
     by_parameter = np.zeros((len(machine.parameters), 6, count), dtype=dtype)
     by_actuator = np.zeros((len(machine.actuators), 6, count), dtype=dtype)
-    standing = Standing.of(configuration)
-    for first in range(0, count, CHUNK):
-        part = slice(first, min(first + CHUNK, count))
+    for part, closure, inverse_rows in _linearised(machine, configuration, parameters):
+        _fill(closure, "parameter", inverse_rows, by_parameter[:, :, part])
+        _fill(closure, "actuator", inverse_rows, by_actuator[:, :, part])
+    return PoseJacobians(by_parameter, by_actuator)
+
+
+def element_twists(
+    machine: Machine,
+    configuration: Configuration,
+    parameters: Numbers | None,
+    places: Sequence[tuple[int, int]],
+) -> Numbers:
+    """Twist (len(places), 6, N) of the platform per mm or rad of single elements.
+
+    As :func:`pose_jacobians`, but of elements that need hold no variable: what a locked joint
+    would do that stood there.
+
+    Parameters
+    ----------
+    places : sequence of (limb, element)
+        Indices in ``machine.limbs`` and in that limb's chain.
+    """
+    dtype = np.result_type(_held(machine, parameters), configuration.poses.position)
+    twists = np.zeros((len(places), 6, configuration.count), dtype=dtype)
+    for part, closure, inverse_rows in _linearised(machine, configuration, parameters):
+        for own, (limb, element) in zip(twists, places, strict=True):
+            rows, answer = closure.column(limb, element)
+            own[:, part] = np.einsum("irn,rn->in", inverse_rows[:, rows], answer)
+    return twists
+
+
+def _held(machine: Machine, parameters: Numbers | None) -> Numbers:
+    values = machine.nominal if parameters is None else np.asarray(parameters)
+    return values[:, None] if values.ndim == 1 else values
+
+
+def _linearised(
+    machine: Machine, configuration: Configuration, parameters: Numbers | None
+) -> Iterator[tuple[slice, Closure, Numbers]]:
+    """Poses a chunk at a time: closure, and twist (6, m, N) per unit of each of its rows."""
+    held, standing = _held(machine, parameters), Standing.of(configuration)
+    for first in range(0, configuration.count, CHUNK):
+        part = slice(first, min(first + CHUNK, configuration.count))
         own = held if held.shape[1] == 1 else held[:, part]
         closure = Closure(machine, own, configuration.extension[:, part], standing.take(part))
         rows, _ = closure.rows()
         solver = platform_solver(rows, machine)
-        inverse_rows = _pseudo_inverse(solver, rows.shape[0], machine.size)
-        _fill(closure, "parameter", inverse_rows, by_parameter[:, :, part])
-        _fill(closure, "actuator", inverse_rows, by_actuator[:, :, part])
-    return PoseJacobians(by_parameter, by_actuator)
+        yield part, closure, _pseudo_inverse(solver, rows.shape[0], machine.size)
 
 
 def _pseudo_inverse(solver: Reflectors, row_count: int, size: float) -> Numbers:

@@ -8,15 +8,16 @@ from typing import Any
 import numpy as np
 
 from calib.errors import BadInput
-from calib.mechanism.chain import ChainReader
+from calib.mechanism.chain import ChainNames, ChainReader
 from calib.mechanism.chain_value import Meant
 from calib.mechanism.description import Actuator, Limb, Parameter, Term
 from calib.mechanism.tables import TableReader
+from calib.mechanism.trait_reader import TraitReader
 from calib.quantity import measured
 
-_TYPE_KEYS = ("chain", "chains", "parameters", "joints", "says")
+_TYPE_KEYS = ("chain", "chains", "parameters", "joints", "traits", "says")
 _PARAMETER_KEYS = ("unit", "tolerance", "sigma", "nominal", "says", "hidden")
-_LIMB_KEYS = ("type", "chain", "chains", "parameters", "joints", "says")
+_LIMB_KEYS = ("type", "chain", "chains", "parameters", "joints", "traits", "says")
 
 
 @dataclass
@@ -27,6 +28,9 @@ class LimbReader(TableReader):
     index: dict[str, int] = field(default_factory=dict)
     actuators: list[Actuator] = field(default_factory=list)
     joints: int = 0
+    chain_names: list[ChainNames] = field(default_factory=list)
+    """Names in the chain of every limb."""
+    traits_stated: bool = False
 
     def add_parameter(
         self, name: str, spec: Any, keys: tuple[str, ...], bound: object | None
@@ -106,8 +110,27 @@ class LimbReader(TableReader):
             self.joints += len(reader.joints)
             first = self.joints - len(reader.joints)
             limbs.append(Limb(name, tuple(reader.elements), tuple(reader.joints), first))
+            self.chain_names.append(reader.names)
         self._check_names(name, spec, declared, used, unknown)
-        return limbs
+        return self._with_traits(name, spec, kind_name, kind, limbs)
+
+    def _with_traits(
+        self,
+        name: str,
+        spec: Mapping[str, Any],
+        kind_name: str,
+        kind: Mapping[str, Any],
+        limbs: list[Limb],
+    ) -> list[Limb]:
+        """The chains of a limb with its own traits, or else those of its type."""
+        own = "traits" in spec
+        keys = ("limbs", name, "traits") if own else ("limb_types", kind_name, "traits")
+        stated = (spec if own else kind).get("traits")
+        if stated is None:
+            return limbs
+        self.traits_stated = True
+        names, nominal = self.chain_names[-len(limbs) :], [p.nominal for p in self.parameters]
+        return TraitReader(self, name, limbs, names, nominal, keys).read(self.table(*keys))
 
     def _chains(
         self, name: str, spec: Mapping[str, Any], kind_name: str, kind: Mapping[str, Any]

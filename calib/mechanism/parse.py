@@ -12,6 +12,7 @@ from calib.mechanism.description import (
 )
 from calib.mechanism.hidden import with_hidden_apart
 from calib.mechanism.limbs import LimbReader
+from calib.mechanism.traits_by_name import traits_by_name
 from calib.toml_place import load_toml
 
 FORMAT = "pkm-machine/1"
@@ -69,6 +70,8 @@ class _Reader(LimbReader):
             raise self.fail("no limb is described", remedy="Add tables [limbs.NAME].")
         limbs = tuple(limb for key in limb_tables for limb in self.limb(key, limb_tables[key]))
         self.check_references(limbs)
+        if not self.traits_stated:
+            limbs = traits_by_name(limbs, self.chain_names, self.parameters, self.actuators)
         home = self.home()
         machine = Machine(
             name=name,
@@ -86,6 +89,7 @@ class _Reader(LimbReader):
                 for k in ("effects", "drawing", "closure", "nests")
                 if k in self.data
             },
+            traits_stated=self.traits_stated,
         )
         return with_hidden_apart(machine)
 

@@ -85,6 +85,7 @@ def test_rough_angles_of_another_branch_are_put_right_by_the_home_actuators() ->
 def test_an_idle_freedom() -> None:
     text = changed(text_of("hexapod"), "swing_B=Rz twist=Ry(roll)", "swing_B=Rz twist=Ry(roll) Ry")
     text = changed(text, "swing_P=Rz", "")
+    text = changed(text, 'platform_joint = ["psi_P", "swing_P"]', "")
     message = fault_of(text)
     assert "has an idle freedom: its joints twist, joint" in message
 

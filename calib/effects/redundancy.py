@@ -1,4 +1,7 @@
-"""Effects of over-constrained tracking mechanisms (Zhang et al. 2018; docs/papers.md)."""
+"""One limb of an over-constrained machine does not carry its constraint.
+
+Zhang et al. 2018 (docs/papers.md) release one limb after the other; the machine file says which.
+"""
 
 from collections.abc import Iterator
 from functools import lru_cache
@@ -7,62 +10,11 @@ import numpy as np
 
 from calib.arrays import Array
 from calib.effects.component import Effect, Signature, Situation, Unknown
-from calib.effects.thermal_growth import REFERENCE_C, ThermalGrowth
-from calib.mechanism.description import Limb, Machine
+from calib.mechanism.description import Machine
 from calib.mechanism.rigid import Poses, small_rotation
 from calib.mechanism.solve import begun_at, forward
 from calib.mechanism.variants import closure_names, with_closure
 from calib.runs.stack import Rows
-
-LINKS = {"rsr": ("1dx2", "1dy2", "4dx5", "4dz5"), "ss": ("3dz4",)}
-"""Error sources along the links of a limb: both links of an RSR limb, the rod of the SS limb."""
-
-
-def _links(machine: Machine) -> dict[str, float]:
-    """Error sources along links, and the link's nominal component along each, mm."""
-    names = {parameter.name for parameter in machine.parameters}
-    found: dict[str, float] = {}
-    for limb in machine.limbs:
-        kind = "rsr" if f"{limb.name}.4dz5" in names else "ss"
-        for part in LINKS[kind]:
-            if f"{limb.name}.{part}" in names:
-                found[f"{limb.name}.{part}"] = _along(machine, limb, f"{limb.name}.{part}")
-    return found
-
-
-def _along(machine: Machine, limb: Limb, name: str) -> float:
-    """Sum of the constant translations beside a parameter, along its axis, with no turn between."""
-    index = machine.index(name)
-    at = next(
-        place
-        for place, element in enumerate(limb.elements)
-        if any(term.kind == "parameter" and term.index == index for term in element.terms)
-    )
-    first = last = at
-    while first > 0 and not limb.elements[first - 1].turns:
-        first -= 1
-    while last + 1 < len(limb.elements) and not limb.elements[last + 1].turns:
-        last += 1
-    axis = limb.elements[at].axis
-    return sum(e.constant for e in limb.elements[first : last + 1] if e.axis == axis)
-
-
-class LinkGrowth(ThermalGrowth):
-    """All links grow; base and platform radius do not."""
-
-    says = "the links grow with the temperature of the structure"
-
-    def applies(self, machine: Machine) -> bool:
-        """Where limbs of two links are described with error sources along them."""
-        return any(parameter.name.endswith(".4dz5") for parameter in machine.parameters)
-
-    def signature(self, situation: Situation, values: Array) -> Signature:
-        """Every link along itself."""
-        warming = situation.rows.channels["structure_temp_C"] - REFERENCE_C
-        total = np.zeros((6, situation.rows.count))
-        for name, length in _links(situation.machine).items():
-            total += length * situation.error_twists(name)
-        return Signature(twist=(warming * total)[None])
 
 
 class Redundancy(Effect):
@@ -72,9 +24,11 @@ class Redundancy(Effect):
     kind = "machine"
     says = "one limb does not carry its constraint: play or a soft joint in it"
 
-    def applies(self, machine: Machine) -> bool:
-        """Where the machine file names closures that release one limb (D1 .. D4)."""
-        return bool(machine.actuators) and bool(_released(machine))
+    def lacking(self, machine: Machine) -> str:
+        """The machine file must name closures that release one limb."""
+        if _released(machine):
+            return ""
+        return "its file names no closure that releases one limb ([closure.NAME] release)"
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``redundancy.share`` and, searched, ``redundancy.limb``."""
@@ -137,4 +91,4 @@ def _released(machine: Machine) -> dict[int, str]:
     return found
 
 
-EFFECTS = (LinkGrowth(), Redundancy())
+EFFECTS = (Redundancy(),)

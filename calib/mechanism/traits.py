@@ -1,0 +1,57 @@
+"""What the parts of a limb are, beside how they move: the traits that a machine file states.
+
+Physical effects hang on these and on nothing else (docs/machine-files.md). Elements are given by
+their place in the limb's chain, which is the same for the machine with its hidden error sources
+and for every other closure of it.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Part:
+    """An element of a chain, and how far it moves per unit of what the file names."""
+
+    element: int
+    factor: float
+
+
+@dataclass(frozen=True)
+class UniversalJoint:
+    """Two passive turns: ``first`` about an axis fixed to the body, ``second`` next to the leg."""
+
+    first: int
+    second: int
+
+
+@dataclass(frozen=True)
+class Traits:
+    """Traits of one chain.
+
+    Attributes
+    ----------
+    grows : tuple of int
+        Translations that are legs, rods or links: they grow with the temperature.
+    base_joint, platform_joint : UniversalJoint or None
+        The universal joints at the two ends of the leg; what they stand on may be a carriage.
+    screw : int or None
+        Passive turn of a leg that is a screw without a guide, about the screw's own axis.
+    sides : tuple of Part
+        Long sides of a parallelogram: half of side 1 less side 2, each in the direction in which
+        the difference grows.
+    platform_azimuth : tuple of Part
+        Turn of the platform joint's frame about the platform's z axis.
+    yields : int or None
+        The compliant element that is a spring under the weight of the platform.
+    """
+
+    grows: tuple[int, ...] = ()
+    base_joint: UniversalJoint | None = None
+    platform_joint: UniversalJoint | None = None
+    screw: int | None = None
+    sides: tuple[Part, ...] = ()
+    platform_azimuth: tuple[Part, ...] = ()
+    yields: int | None = None
+
+
+NO_TRAITS = Traits()
