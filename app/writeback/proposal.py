@@ -103,10 +103,6 @@ def _change(fit: SavedFit, name: str, held: Mapping[str, float], add_to: float) 
     return Change(name, held[name], new, found.sigma, found.unit, found.identified)
 
 
-def _change_to(name: str, held: Mapping[str, float], new: float, sigma: float, unit: str) -> Change:
-    return Change(name, held[name], new, sigma, unit, True)
-
-
 def _cyclic(fit: SavedFit, held: Mapping[str, float], left_out: dict[str, str]) -> list[Change]:
     """Turn A sin(2 pi s / p) + B cos(2 pi s / p) into the controller's table of each actuator."""
     effect = "screw-cyclic"

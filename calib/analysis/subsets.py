@@ -13,7 +13,6 @@ import numpy as np
 
 from calib.analysis.identifiability import EXACT, exact_rank
 from calib.analysis.observation import Observation
-from calib.arrays import Array
 from calib.errors import BadInput
 from calib.poses.information import Judge
 
@@ -123,10 +122,3 @@ def compare_subsets(
         calibrated(observation, judge, [*held, *others] if held else [], priors=priors, says=says)
         for says, held, priors in cases
     )
-
-
-def visible_alone(observation: Observation) -> Array:
-    """Norm of every unknown's effect on the readings, in standard deviations of a reading's noise,
-    for one prior sigma; 0 for what no reading can see."""
-    norms: Array = np.linalg.norm(observation.A, axis=0)
-    return norms

@@ -9,7 +9,7 @@ from scipy import stats
 
 from calib.discover.agreement import TOGETHER_WORSE, runs_at_odds, untrue_uncertainties
 from calib.discover.diagnosis import RunDiagnosis
-from calib.discover.discovery import RunStage, stage_of
+from calib.discover.discovery import stage_of
 from calib.evidence.findings import Diagnosis, Finding
 from calib.evidence.forward import Discovery
 from calib.identify.fitting import Fit
@@ -216,8 +216,3 @@ def _readings(count: int) -> str:
 def _um(millimetres: float) -> float | None:
     value = 1000.0 * millimetres
     return value if math.isfinite(value) else None
-
-
-def staircase(discovery: Discovery) -> list[RunStage]:
-    """Stages of a discovery in order."""
-    return [stage_of(discovery, number) for number in range(len(discovery.steps))]

@@ -103,11 +103,6 @@ class Compiled:
         """Whether the limbs are over-constrained (more wrenches than the pose has freedoms)."""
         return self.wrenches > 6
 
-    @property
-    def elastic(self) -> bool:
-        """Whether any element yields under load."""
-        return any(group.compliant for group in self.groups)
-
 
 def _signature(limb: Limb) -> object:
     return (

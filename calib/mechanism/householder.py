@@ -68,16 +68,6 @@ class Reflectors:
             x[k] /= R[k, k]
         return x
 
-    def solve_triangle_transposed(self, b: Numbers) -> Numbers:
-        """R^-T b for b (n, ...) or (n, k, ...)."""
-        R, n = self.triangle, self.columns
-        x = np.array(b)
-        for k in range(n):
-            for j in range(k):
-                x[k] -= R[j, k] * x[j]
-            x[k] /= R[k, k]
-        return x
-
     def diagonal_ratio(self) -> Numbers:
         """Smallest over largest magnitude on the diagonal of R, shape (...): a rank warning."""
         diagonal = np.abs(np.stack([self.triangle[k, k] for k in range(self.columns)]))

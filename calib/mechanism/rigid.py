@@ -30,12 +30,6 @@ def rotate(R: Numbers, v: Numbers) -> Numbers:
     return out
 
 
-def rotate_back(R: Numbers, v: Numbers) -> Numbers:
-    """R^T v for R (3, 3, ...) and v (3, ...)."""
-    out: Numbers = R[0] * v[0] + R[1] * v[1] + R[2] * v[2]
-    return out
-
-
 def product(A: Numbers, B: Numbers) -> Numbers:
     """A B of rotations (3, 3, ...)."""
     return np.stack([rotate(A, B[:, j]) for j in range(3)], axis=1)
