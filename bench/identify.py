@@ -5,7 +5,6 @@ python -m bench identify
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,19 +22,7 @@ RUN = Path(__file__).parents[1] / "tests" / "data" / "runs" / "no-effect"
 def first_poses(rows: Rows, count: int) -> Rows:
     """Readings of the first ``count`` poses, and the references."""
     keep = np.array([not name or int(name) <= count for name in rows.pose_name])
-    return replace(
-        rows,
-        **{
-            name: getattr(rows, name)[..., keep]
-            for name in (
-                "run", "line", "extension", "q", "direction", "step", "time_s", "progress",
-                "position", "covariance", "nest", "on_platform", "fold",
-            )
-        },
-        pose_name=tuple(np.array(rows.pose_name)[keep]),
-        nest_name=tuple(np.array(rows.nest_name)[keep]),
-        channels={name: values[keep] for name, values in rows.channels.items()},
-    )  # fmt: skip
+    return rows.take(keep)
 
 
 def best_of(function: Callable[[], object], repeats: int) -> float:

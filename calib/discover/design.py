@@ -194,11 +194,11 @@ def _planned(
 ) -> FollowUpPlan:
     follow = FollowUp(fit, poses, condition)
     together = OldAndNew(fit, follow)
-    start = follow.approached(None)
+    start = follow.approached([])
     separations = [separation(side, rival_of(sides, side), together, start) for side in sides]
 
     def offer(chosen: list[int]) -> list[CandidateBlocks]:
-        rows = follow.approached(poses.q[:, chosen[-1]] if chosen else None)
+        rows = follow.approached(chosen)
         shared = together.new(rows)
         return [
             blocks_of_side(side, rival_of(sides, side), together, shared, rows) for side in sides
@@ -214,20 +214,18 @@ def _rehearsed(
 ) -> dict[str, float]:
     """Probabilities of success with old and new readings in one fit."""
     follow = together.follow
-    start = follow.approached(None)
+    start = follow.approached([])
     jacobian = [together.old(), follow.of_base(together.new(start))]
     then: list[list[Array]] = []
     for side in sides:
         base = matched(side, effect_columns_then(side, follow, start)[0])
         then.append([follow.of_base(base)])
-    origin: Array | None = None
-    for index in chosen:
-        rows = follow.approached(origin)
+    for number, index in enumerate(chosen):
+        rows = follow.approached(chosen[:number])
         jacobian.append(follow.by_pose(together.new(rows))[index])
         for side, blocks in zip(sides, then, strict=True):
             here = matched(side, effect_columns_then(side, follow, rows)[0])
             blocks.append(follow.by_pose(here)[index])
-        origin = follow.poses.q[:, index]
     whole = np.concatenate(jacobian, axis=1)
     problem = LinearProblem(np.zeros(whole.shape[1]), whole, together.precision)
     offered = [

@@ -1,23 +1,24 @@
 """Readings that have not been taken yet, as the model would see them: poses of a follow-up run.
 
-A follow-up has its own frame and its own drift; geometry and machine effects are shared with the
-runs there are. What a reading shows may depend on where the machine came from (direction, step),
-so columns are made again for every pose that could come before.
+A follow-up is a run of its own: it has its own frame and its own drift, and begins at home with no
+past; geometry and machine effects are shared with the runs there are. What a reading shows may
+depend on the whole way to its pose, so columns are made again after every pose that is chosen.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from calib.arrays import Array
+from calib.arrays import Array, IntArray
 from calib.effects.component import Effect
 from calib.identify.fitting import Fit
 from calib.model.columns import whitened_columns
 from calib.model.prediction import Model
 from calib.model.state import State
 from calib.poses.reach import PoseSet
-from calib.runs.stack import STEP_MM, STEP_RAD, Rows
+from calib.runs.commanded import CommandedPath
+from calib.runs.stack import Rows
 from calib.unknown import linear_among
 
 BASE_READS = 2
@@ -37,6 +38,8 @@ def hypothetical_rows(fit: Fit, poses: PoseSet, channels: Mapping[str, float]) -
     """Readings of every platform nest at each of C poses, then of every base nest, twice.
 
     Rows are nest after nest within a pose; ``channels`` overrides the last value of a channel.
+    Every pose is the first after home. ``time_s`` is spread over the follow-up, for drifts; the
+    clock of the path is that of the visits.
     """
     old = fit.model.rows
     header = old.runs[-1].header
@@ -52,6 +55,7 @@ def hypothetical_rows(fit: Fit, poses: PoseSet, channels: Mapping[str, float]) -
     covariance = old.covariance[:, :, typical].mean(axis=2)
     progress = np.linspace(0.0, 1.0, total)
     duration = max(float(np.ptp(old.time_s)), 1.0)
+    path, stops = _way(old, poses, [])
     return Rows(
         machine=old.machine,
         runs=(old.runs[-1],),
@@ -61,8 +65,10 @@ def hypothetical_rows(fit: Fit, poses: PoseSet, channels: Mapping[str, float]) -
         nest_name=(*list(nests) * count, *list(base) * BASE_READS),
         extension=old.machine.extension(q, header.controller_parameters),
         q=q,
-        direction=np.zeros_like(q),
-        step=np.zeros_like(q),
+        path=path,
+        at=np.concatenate(
+            [np.repeat(stops, len(nests)), np.zeros(total - platform, dtype=np.intp)]
+        ),
         time_s=float(old.time_s.max()) + duration * progress,
         progress=progress,
         position=np.zeros((3, total)),
@@ -72,6 +78,20 @@ def hypothetical_rows(fit: Fit, poses: PoseSet, channels: Mapping[str, float]) -
         fold=np.full(total, -1, dtype=np.intp),
         channels={name: _channel(old, name, channels, total) for name in old.channels},
     )
+
+
+def _way(old: Rows, poses: PoseSet, chosen: Sequence[int]) -> tuple[CommandedPath, IntArray]:
+    """Path from home over the chosen poses, and the row (C,) of each pose as the next on it."""
+    machine, held = old.machine, old.runs[-1].header.controller_parameters
+    q, begin = machine.extension(poses.q, held), float(old.time_s.max())
+    pace = max(float(np.ptp(old.time_s)), 1.0) / np.unique(old.path.stop).size
+    home = machine.extension(machine.home_q[:, None], held)
+    path = CommandedPath.of_run(home, np.array([begin]), old.path.motion)
+    for number, index in enumerate(chosen, start=1):
+        path = path.branched(path.count - 1, q[:, [index]], begin + pace * number)
+    here = path.count
+    path = path.branched(here - 1, q, begin + pace * here)
+    return path, np.arange(here, path.count, dtype=np.intp)
 
 
 def _channel(old: Rows, name: str, given: Mapping[str, float], total: int) -> Array:
@@ -111,13 +131,12 @@ class FollowUp:
         self.frame = linear.jacobian[self.model.free.size :]
         self.state: State = linear.state
 
-    def approached(self, origin: Array | None) -> Rows:
-        """The same readings if the machine comes to each pose from coordinates ``origin`` (n,)."""
-        origin = self.rows.machine.home_q if origin is None else origin
-        step = self.rows.q - origin[:, None]
-        threshold = [STEP_MM if a.unit == "mm" else STEP_RAD for a in self.rows.machine.actuators]
-        moved = np.abs(step) > np.array(threshold)[:, None]
-        return replace(self.rows, direction=np.sign(step) * moved, step=np.where(moved, step, 0.0))
+    def approached(self, chosen: Sequence[int]) -> Rows:
+        """The same readings if the machine goes from home to the ``chosen`` poses, then to each."""
+        path, stops = _way(self.fit.model.rows, self.poses, chosen)
+        at = self.rows.at.copy()
+        at[: stops.size * self.nests] = np.repeat(stops, self.nests)
+        return replace(self.rows, path=path, at=at)
 
     def columns(self, effect: Effect, values: Array, rows: Rows) -> Array:
         """Whitened derivatives (k, 3, N) by the linear unknowns of an effect."""

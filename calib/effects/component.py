@@ -137,7 +137,9 @@ class Effect(ABC):
     channels : tuple of str
         Channels that a reading must have; readings without are left out for this effect.
     depends : tuple of str
-        Columns of :class:`Rows` on which the extensions depend beside the pose.
+        Columns of :class:`Rows` on which the extensions depend beside the pose: readings that
+        agree in them share one closure. An effect that remembers names ``path`` (and ``time_s``
+        if it matters how long the machine stood): it reads ``situation.rows.path``.
     """
 
     id: str

@@ -117,14 +117,10 @@ class Model:
     def _states(self) -> tuple[IntArray, IntArray]:
         """Representative readings (M,) of distinct machine states, and each reading's state."""
         depends = dict.fromkeys(name for e in self.effects for name in e.depends)
-        columns = [self.rows.column(n) for n in depends if self._has(n)]
+        columns = [self.rows.column(n) for n in depends if self.rows.has(n)]
         key = np.nan_to_num(np.concatenate([self.rows.extension, *columns]))
         _, first, inverse = np.unique(key, axis=1, return_index=True, return_inverse=True)
         return first, inverse.reshape(-1)
-
-    def _has(self, name: str) -> bool:
-        fixed = ("q", "direction", "step", "extension", "time_s", "progress", "run")
-        return name in fixed or name in self.rows.channels
 
     @cached_property
     def nominal_configuration(self) -> Configuration:

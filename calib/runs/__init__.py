@@ -3,7 +3,7 @@
 from calib.runs.covariance import covariance_matrices
 from calib.runs.header import Header, Load, parse_header
 from calib.runs.points import parse_points, parse_run
-from calib.runs.record import Run, approach, holdout_folds
+from calib.runs.record import Run, holdout_folds
 from calib.runs.writing import Digits, format_header, format_points, format_run
 
 __all__ = [
@@ -11,7 +11,6 @@ __all__ = [
     "Header",
     "Load",
     "Run",
-    "approach",
     "covariance_matrices",
     "format_header",
     "format_points",

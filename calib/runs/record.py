@@ -63,31 +63,6 @@ class Run:
         return int(self.measured.sum())
 
 
-def approach(q: Array, threshold: Array) -> tuple[Array, Array]:
-    """Direction of approach and last step of every actuator at every row.
-
-    Parameters
-    ----------
-    q : array, shape (n, N)
-        Commanded coordinates in the order of the rows; every row counts as a move.
-    threshold : array, shape (n,)
-        Changes up to this are rounding, not motion (1e-4 mm, 1e-6 rad).
-
-    Returns
-    -------
-    direction : array, shape (n, N)
-        Sign of the last change; 0 before the first.
-    step : array, shape (n, N)
-        That last change itself, with its sign; 0 before the first.
-    """
-    change = np.diff(q, axis=1, prepend=q[:, :1])
-    change[np.abs(change) <= threshold[:, None]] = 0.0
-    latest = np.where(change != 0.0, np.arange(q.shape[1]), 0)
-    np.maximum.accumulate(latest, axis=1, out=latest)
-    step = np.take_along_axis(change, latest, axis=1)
-    return np.sign(step), step
-
-
 def holdout_folds(run: Run) -> NDArray[np.int64]:
     """Fold (0..4) of every row, whole pose labels together; -1 for references and moves.
 

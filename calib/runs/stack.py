@@ -1,7 +1,7 @@
 """The readings of one or several runs of a machine, stacked for the model."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -9,15 +9,20 @@ import numpy as np
 from calib.arrays import Array, BoolArray, IntArray, Selection
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
-from calib.runs.record import Run, approach, holdout_folds
+from calib.runs.commanded import CommandedPath, joined_paths
+from calib.runs.record import Run, holdout_folds
 
-STEP_MM = 1e-4
-STEP_RAD = 1e-6
+STATES = ("q", "extension", "direction", "step", "time_s", "progress", "run", "path")
+"""State columns that every reading has; all others are channels."""
+_ARRAYS = (
+    "run", "line", "extension", "q", "at", "time_s", "progress", "position", "covariance", "nest",
+    "on_platform", "fold",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """N readings of K runs; rows without a reading have left their mark in ``direction``.
+    """N readings of K runs; rows without a reading are on the ``path`` that led to them.
 
     Attributes
     ----------
@@ -25,8 +30,9 @@ class Rows:
         Run index 0..K-1, and line in that run's ``points.csv``.
     extension, q : (n, N)
         Commanded extension s by the controller's own parameters, and coordinate q.
-    direction, step : (n, N)
-        Sign and size of each actuator's last change (0 before the first).
+    path, at : CommandedPath, (N,)
+        Where the actuators went, row by row from the start of each run, and the row on it of each
+        reading: all that a reading may remember.
     time_s, progress : (N,)
         Seconds from the start of the run, and the same as 0..1 over the run.
     position, covariance : (3, N), (3, 3, N)
@@ -47,8 +53,8 @@ class Rows:
     nest_name: tuple[str, ...]
     extension: Array
     q: Array
-    direction: Array
-    step: Array
+    path: CommandedPath
+    at: IntArray
     time_s: Array
     progress: Array
     position: Array
@@ -62,6 +68,27 @@ class Rows:
     def count(self) -> int:
         """Number of readings N."""
         return self.run.size
+
+    @cached_property
+    def direction(self) -> Array:
+        """Sign (n, N) of each actuator's last change; 0 before the first."""
+        return self.path.direction[:, self.at]
+
+    @cached_property
+    def step(self) -> Array:
+        """Last change (n, N) of each actuator itself, with its sign; 0 before the first."""
+        return self.path.step[:, self.at]
+
+    def take(self, which: Selection) -> "Rows":
+        """Readings selected by index, slice or mask; what led to each stays as it was."""
+        chosen = np.arange(self.count)[which]
+        return replace(
+            self,
+            pose_name=tuple(self.pose_name[row] for row in chosen),
+            nest_name=tuple(self.nest_name[row] for row in chosen),
+            channels={name: values[chosen] for name, values in self.channels.items()},
+            **{name: getattr(self, name)[..., chosen] for name in _ARRAYS},
+        )
 
     @cached_property
     def unwhitener(self) -> Array:
@@ -80,16 +107,19 @@ class Rows:
         factors = self.unwhitener[:, :, which]
         return np.asarray(np.einsum("ijn,...jn->...in", factors, whitened))
 
+    def has(self, name: str) -> bool:
+        """Whether there is a state column of that name."""
+        return name in STATES or name in self.channels
+
     def column(self, name: str) -> Array:
-        """State columns (k, N) by name: q, direction, step, time_s, progress or a channel."""
-        if name in ("q", "direction", "step", "extension"):
-            values: Array = getattr(self, name)
-            return values
-        if name in ("time_s", "progress"):
-            return np.asarray(getattr(self, name))[None]
-        if name == "run":
-            return self.run[None].astype(np.float64)
-        return self.channels[name][None]
+        """State columns (k, N) by name: one of ``STATES`` or a channel.
+
+        ``path`` numbers the stops of the path: readings with one number have one past.
+        """
+        if name == "path":
+            return self.path.stop[self.at][None].astype(np.float64)
+        values = getattr(self, name) if name in STATES else self.channels[name]
+        return np.atleast_2d(np.asarray(values, dtype=np.float64))
 
     def place(self, row: int) -> str:
         """Where a reading stands, for messages."""
@@ -106,8 +136,8 @@ def stack(machine: Machine, runs: Sequence[Run]) -> Rows:
     """
     if not runs:
         raise BadInput("no run is given", remedy="Name at least one run's folder")
-    threshold = np.array([STEP_MM if a.unit == "mm" else STEP_RAD for a in machine.actuators])
-    parts = [_part(machine, run, index, threshold) for index, run in enumerate(runs)]
+    parts = [_part(machine, run, index) for index, run in enumerate(runs)]
+    starts = np.cumsum([0, *(part.path.count for part in parts)])
     names = dict.fromkeys(name for run in runs for name in run.channels)
     return Rows(
         machine=machine,
@@ -120,20 +150,23 @@ def stack(machine: Machine, runs: Sequence[Run]) -> Rows:
             )
             for name in names
         },
+        path=joined_paths([part.path for part in parts]),
+        at=np.concatenate(
+            [part.at + start for part, start in zip(parts, starts[:-1], strict=True)]
+        ),
         **{
             field: np.concatenate([getattr(part, field) for part in parts], axis=-1)
-            for field in (
-                "run", "line", "extension", "q", "direction", "step", "time_s", "progress",
-                "position", "covariance", "nest", "on_platform", "fold",
-            )
+            for field in _ARRAYS
+            if field != "at"
         },
-    )  # fmt: skip
+    )
 
 
-def _part(machine: Machine, run: Run, index: int, threshold: Array) -> Rows:
-    """One run's readings; the direction of approach is taken over all its rows."""
+def _part(machine: Machine, run: Run, index: int) -> Rows:
+    """One run's readings, on the path of all its rows."""
     rows = np.flatnonzero(run.measured)
-    direction, step = approach(run.q, threshold)
+    extension = machine.extension(run.q, run.header.controller_parameters)
+    motion = np.array([axis.motion for axis in machine.axes])
     nests = {**run.header.platform_nests, **run.header.base_nests}
     names = tuple(run.nest[row] for row in rows)
     span = float(np.ptp(run.time_s))
@@ -145,10 +178,10 @@ def _part(machine: Machine, run: Run, index: int, threshold: Array) -> Rows:
         line=run.line[rows].astype(np.intp),
         pose_name=tuple(run.pose[row] for row in rows),
         nest_name=names,
-        extension=machine.extension(run.q[:, rows], run.header.controller_parameters),
+        extension=extension[:, rows],
         q=run.q[:, rows],
-        direction=direction[:, rows],
-        step=step[:, rows],
+        path=CommandedPath.of_run(extension, run.time_s, motion),
+        at=rows.astype(np.intp),
         time_s=run.time_s[rows],
         progress=progress[rows],
         position=run.position[:, rows],

@@ -24,19 +24,6 @@ def changed(rows, row, shift):
     return replace(rows, position=position)
 
 
-def kept(rows, keep):
-    keep = np.asarray(keep)
-    arrays = ("run", "line", "extension", "q", "direction", "step", "time_s", "progress",
-              "position", "covariance", "nest", "on_platform", "fold")  # fmt: skip
-    return replace(
-        rows,
-        **{name: getattr(rows, name)[..., keep] for name in arrays},
-        pose_name=tuple(n for n, k in zip(rows.pose_name, keep, strict=True) if k),
-        nest_name=tuple(n for n, k in zip(rows.nest_name, keep, strict=True) if k),
-        channels={name: values[keep] for name, values in rows.channels.items()},
-    )
-
-
 def test_identify_example_without_effect_reaches_the_noise(example):
     report = fit_report(fit(Model(example("no-effect"))))
     assert report["chi2_per_dof"] == pytest.approx(1.0, abs=0.1)
@@ -57,7 +44,7 @@ def test_identify_exact_readings_leave_no_residual(simulated):
 def test_identify_jacobian_with_every_effect_against_central_differences(example):
     whole = example("backlash-leg-3")
     frames = fit(Model(whole)).linear.state
-    rows = kept(whole, [name in ("", "7", "33", "61", "70") for name in whole.pose_name])
+    rows = whole.take([name in ("", "7", "33", "61", "70") for name in whole.pose_name])
     model = Model(rows, catalogue(rows.machine))
     generator = np.random.default_rng(5)
     effects = tuple(
@@ -195,7 +182,7 @@ def test_identify_two_runs_share_the_geometry_and_not_the_frame(example):
 def test_identify_few_readings_fall_back_on_the_drawing(example):
     rows = example("no-effect")
     poses = [name for name in dict.fromkeys(rows.pose_name) if name][:2]
-    found = fit(Model(kept(rows, [name in poses for name in rows.pose_name])))
+    found = fit(Model(rows.take([name in poses for name in rows.pose_name])))
     assert found.readings == 6
     assert len(unknown := [p for g in fit_report(found)["unidentified"] for p in g]) > 40, unknown
 
@@ -204,7 +191,7 @@ def test_identify_readings_on_a_line_are_refused_in_words(example):
     rows = example("no-effect")
     home = [name in ("b1", "b3") for name in rows.nest_name]
     with pytest.raises(BadInput, match="on one line"):
-        fit(Model(kept(rows, home)))
+        fit(Model(rows.take(home)))
 
 
 def test_identify_another_machines_readings_are_refused_in_words(example):

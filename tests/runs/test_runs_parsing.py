@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calib.errors import BadInput
-from calib.runs import approach, format_run, holdout_folds, parse_run
+from calib.runs import format_run, holdout_folds, parse_run
 
 RUNS = Path(__file__).parents[1] / "data" / "runs"
 
@@ -175,13 +175,6 @@ def test_runs_every_truncation_is_an_error_or_a_whole_run():
         except BadInput:
             continue
         assert CSV[:end].rstrip("\n").endswith(ROWS[len(run.nest) - 1])
-
-
-def test_runs_approach_keeps_the_last_direction_through_rest_and_rounding():
-    q = np.array([[0.0, 0.0, 2.0, 2.0, 2.00005, 1.0, 1.0]])
-    direction, step = approach(q, np.array([1e-4]))
-    assert direction[0].tolist() == [0, 0, 1, 1, 1, -1, -1]
-    np.testing.assert_allclose(step[0, [1, 2, 4, 6]], [0, 2, 2, -1.00005])
 
 
 def test_runs_folds_hold_whole_poses_and_do_not_change():
