@@ -1,30 +1,21 @@
 """Cases of the blind trial: what is hidden, how large, and how it is measured."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
-from mocks.physics.hidden import Hidden
+from mocks.hidden import effects, effects_of
+from mocks.hidden.effect import Site, Table
+from mocks.hidden.table import Hidden
+from mocks.physics.bodies import body_named
 from mocks.simulate.plan import Profile, RunPlan
 from mocks.simulate.run import SimulatedRun, simulate
 
 SIGMA_MM = 0.005
-LEGS = {
-    "hexapod": tuple(f"leg{k}" for k in range(1, 7)),
-    "tripod": tuple(f"limb{k}" for k in range(1, 4)),
-    "ptm": ("limb1", "limb2"),
-}
-NESTS = {
-    "hexapod": ("3", "4", "5"),
-    "tripod": ("p1", "p2", "p3"),
-    "ptm": ("p1", "p2", "p3"),
-}
 POSE_SETS = ("designed 29", "random 29", "random 60", "random 100")
 PROFILE = Profile(rise_K=6.0, payload_kg=(0.0, 12.0, 0.0, 12.0, 0.0, 12.0))
-
-Table = dict[str, float]
-Draw = Callable[[str, np.random.Generator], Table]
 
 
 @dataclass(frozen=True)
@@ -46,147 +37,20 @@ class Case:
         return ("none", "single", "several")[min(len(self.effects), 2)]
 
 
-def _legs(stem: str, machine: str, rng: np.random.Generator) -> Table:
-    """One leg, or all of them, with equal probability."""
-    legs = LEGS[machine]
-    chosen = legs if rng.random() < 0.5 else (legs[rng.integers(len(legs))],)
-    return {f"{stem}.{leg}": float(rng.standard_normal()) for leg in chosen}
+@cache
+def site_of(machine: str) -> Site:
+    """Where effects are hidden on a mock machine."""
+    body = body_named(machine)
+    return Site(machine, body.limbs, tuple(body.around.platform_nests), body.stroke)
 
 
-def _of_legs(stem: str) -> Draw:
-    return lambda machine, rng: _legs(stem, machine, rng)
-
-
-def _backlash(machine: str, rng: np.random.Generator) -> Table:
-    return {name: abs(value) for name, value in _legs("backlash", machine, rng).items()}
-
-
-def _cyclic(machine: str, rng: np.random.Generator) -> Table:
-    low, high = (0.1, 6.28) if machine == "ptm" else (1.5, 12.0)  # rad, mm
-    table = {"screw-cyclic.period": float(np.exp(rng.uniform(np.log(low), np.log(high))))}
-    for name, value in _legs("screw-cyclic", machine, rng).items():
-        phase = rng.uniform(0.0, 2.0 * np.pi)
-        table[f"{name}.sin"] = float(value * np.cos(phase))
-        table[f"{name}.cos"] = float(value * np.sin(phase))
-    return table
-
-
-def _direction(names: Sequence[str], rng: np.random.Generator) -> Table:
-    return dict(zip(names, map(float, rng.standard_normal(len(names))), strict=True))
-
-
-def _drift(machine: str, rng: np.random.Generator) -> Table:
-    table = _direction([f"tracker-drift.v{axis}" for axis in "xyz"], rng)
-    table.update({f"tracker-drift.w{axis}": float(7e-4 * rng.standard_normal()) for axis in "xyz"})
-    return table
-
-
-def _nest(machine: str, rng: np.random.Generator) -> Table:
-    nest = NESTS[machine][rng.integers(3)]
-    return _direction([f"nest-offset.{nest}.{axis}" for axis in "xyz"], rng)
-
-
-def _tilt(machine: str, rng: np.random.Generator) -> Table:
-    legs = LEGS[machine]
-    names = [
-        f"joint-tilt.{leg}.{b}.{a}" for leg in legs for b in ("base", "platform") for a in "yz"
+def drawn_on(machine: str, *, unknown: bool) -> list[str]:
+    """Effects of the catalogue, or those outside it, that can be hidden on a mock machine."""
+    return [
+        effect.id
+        for effect in effects_of(machine)
+        if machine not in effect.unseen and effect.id.startswith("unknown.") == unknown
     ]
-    return _direction(names, rng)
-
-
-def _shift(machine: str, rng: np.random.Generator) -> Table:
-    table = _direction([f"frame-shift.{axis}" for axis in "xyz"], rng)
-    table["frame-shift.where"] = float(rng.integers(2))
-    table["frame-shift.t0"] = float(rng.uniform(0.2, 0.8))
-    return table
-
-
-def _settling(machine: str, rng: np.random.Generator) -> Table:
-    return {"settling.k": float(rng.choice([-1.0, 1.0])), "settling.tau": float(rng.uniform(1, 4))}
-
-
-def _redundancy(machine: str, rng: np.random.Generator) -> Table:
-    return {"redundancy.limb": float(rng.integers(1, 5)), "redundancy.share": 1.0}
-
-
-def _one(name: str) -> Draw:
-    return lambda machine, rng: {name: float(rng.choice([-1.0, 1.0]))}
-
-
-def _positive(name: str) -> Draw:
-    return lambda machine, rng: {name: 1.0}
-
-
-def _tide(machine: str, rng: np.random.Generator) -> Table:
-    period = float(rng.uniform(400, 1500))
-    return {"unknown.tide.amplitude": 1.0, "unknown.tide.period": period}
-
-
-def _wobble(machine: str, rng: np.random.Generator) -> Table:
-    return {"unknown.wobble.amplitude": 1.0, "unknown.wobble.period": float(rng.uniform(5, 20))}
-
-
-EFFECTS: dict[str, Draw] = {
-    "backlash": _backlash,
-    "frame-shift": _shift,
-    "gravity-sag": _positive("gravity-sag.c"),
-    "joint-azimuth": _of_legs("joint-azimuth"),
-    "joint-tilt": _tilt,
-    "nest-offset": _nest,
-    "parallelogram-sides": _of_legs("parallelogram-sides"),
-    "redundancy": _redundancy,
-    "screw-cyclic": _cyclic,
-    "screw-pitch": _of_legs("screw-pitch"),
-    "screw-twist": _one("screw-twist.L"),
-    "settling": _settling,
-    "thermal-growth": _positive("thermal-growth.a"),
-    "tracker-drift": _drift,
-    "tracker-offset": _one("tracker-offset.r0"),
-    "tracker-scale": _one("tracker-scale.k"),
-}
-UNKNOWN: dict[str, Draw] = {
-    "unknown.screw-quadratic": _of_legs("unknown.screw-quadratic"),
-    "unknown.hysteresis": _of_legs("unknown.hysteresis"),
-    "unknown.bending": _one("unknown.bending.k"),
-    "unknown.soft-legs": _one("unknown.soft-legs.k"),
-    "unknown.platform-flex": _one("unknown.platform-flex.k"),
-    "unknown.tide": _tide,
-    "unknown.wobble": _wobble,
-}
-ABSENT = {
-    "hexapod": {"joint-azimuth", "parallelogram-sides", "redundancy"},
-    "ptm": {
-        "joint-azimuth",
-        "joint-tilt",
-        "parallelogram-sides",
-        "screw-twist",
-        "unknown.bending",
-        "unknown.soft-legs",
-    },
-    "tripod": {
-        "joint-tilt",
-        "redundancy",
-        "screw-twist",
-        "unknown.bending",
-        "unknown.soft-legs",
-        "unknown.platform-flex",  # its platform does not tilt
-    },
-}
-FIXED = ("period", "tau", "t0", "where", "limb")
-"""Numbers that are no amplitudes: they keep their values when a case is scaled."""
-TRIAL_MM = 0.01
-TRIAL = {
-    "gravity-sag": 1e-4, "thermal-growth": 1e-5, "screw-pitch": 1e-3, "screw-twist": 1.0,
-    "settling": 1e-3, "joint-azimuth": 1e-4, "tracker-scale": 1e-5, "joint-tilt": 2e-3,
-    "unknown.screw-quadratic": 1e-5, "unknown.bending": 1e-3, "unknown.soft-legs": 1e-6,
-    "unknown.platform-flex": 1e-2, "redundancy": 0.1,
-}  # fmt: skip
-"""Amplitude of a first trial in the effect's own unit, before it is scaled to a size."""
-TRIAL_ROTARY = {
-    "backlash": 1e-5, "screw-cyclic": 1e-5, "screw-pitch": 1e-5, "settling": 1e-5,
-    "gravity-sag": 1e-9, "unknown.screw-quadratic": 1e-5, "unknown.hysteresis": 1e-5,
-}  # fmt: skip
-"""The same where actuators turn: rad, rad/rad, rad/(N mm), 1/rad."""
 
 
 def _plan(case: Case, poses: object) -> RunPlan:
@@ -216,23 +80,22 @@ def _scaled(
     plan: RunPlan, empty: SimulatedRun, name: str, size: float, rng: np.random.Generator
 ) -> Table:
     """Amplitudes such that the effect displaces the readings by ``size`` sqrt(3) sigma RMS."""
-    table = (EFFECTS | UNKNOWN)[name](plan.machine, rng)
-    span = float(empty.layout.time[-1])
-    if "frame-shift.t0" in table:
-        table["frame-shift.t0"] *= span
-    own = TRIAL_ROTARY if plan.machine == "ptm" else {}
-    trial = own.get(name, TRIAL.get(name, TRIAL_MM))
-    amplitude = [key for key in table if key.rpartition(".")[2] not in FIXED]
+    effect = next(effect for effect in effects() if effect.id == name)
+    site = replace(site_of(plan.machine), span_s=float(empty.layout.time[-1]))
+    table = effect.draw(site, rng)
+    trial = effect.trial
+    if site.rotary and effect.trial_rotary is not None:
+        trial = effect.trial_rotary
+    amplitude = [key for key in table if key.rpartition(".")[2] not in effect.steady]
     table |= {key: table[key] * trial for key in amplitude}
-    bent = 0.5 if name == "redundancy" else 1.0  # a limb that softens is not linear in its share
-    for _ in range(16 if name == "redundancy" else 3):
+    bent = 1.0 if effect.linear else 0.5
+    for _ in range(3 if effect.linear else 16):
         seen = simulate(replace(plan, hidden=Hidden(table)))
         moved = (seen.xyz - empty.xyz)[empty.layout.reading]
         rms = float(np.sqrt(np.mean(np.sum(moved**2, axis=1))))
         factor = size * np.sqrt(3.0) * SIGMA_MM / rms
-        table |= {key: table[key] * factor**bent for key in amplitude}
-        if "redundancy.share" in table:
-            table["redundancy.share"] = min(table["redundancy.share"], 1.0)
+        most = 1.0 if not effect.linear else np.inf  # a share: what is wholly gone cannot go more
+        table |= {key: min(table[key] * factor**bent, most) for key in amplitude}
         if abs(factor - 1.0) < 0.02:
             break
     return table
@@ -278,8 +141,7 @@ def draw_cases(count: int, seed: int, machine: str) -> list[Case]:
     designed ones for more than half of the single effects of size 1.
     """
     rng = np.random.default_rng([seed, len(machine)])
-    absent = ABSENT[machine]
-    names, unknown = sorted(EFFECTS.keys() - absent), sorted(UNKNOWN.keys() - absent)
+    names, unknown = drawn_on(machine, unknown=False), drawn_on(machine, unknown=True)
     cases = []
     for number in range(count):
         kind, turn = number % 10, number // 10

@@ -31,8 +31,8 @@ from mocks.canopen.server import CanopenStation
 from mocks.clock import ScaledClock
 from mocks.control import ControlServer, Hands
 from mocks.gcs.server import GcsStation
+from mocks.hidden.table import Hidden
 from mocks.physics.bodies import BODIES
-from mocks.physics.hidden import Hidden
 from mocks.physics.truth import draw_parameters, machine_file, read_parameters
 from mocks.tracker.instrument import SERIAL
 from mocks.tracker.server import TrackerServer

@@ -11,11 +11,12 @@ import numpy as np
 
 from mocks.clock import Clock, ScaledClock
 from mocks.faults import FaultSet
-from mocks.physics.actuators import Circumstances, Load, Stroke, play_widths
+from mocks.hidden.table import Hidden
+from mocks.physics.actuators import Load, play_widths
 from mocks.physics.bodies import body_named
 from mocks.physics.body import Surroundings
+from mocks.physics.circumstances import Circumstances, Stroke
 from mocks.physics.climate import Climate
-from mocks.physics.hidden import Hidden
 from mocks.physics.motion import LegMotion
 from mocks.physics.pose import Array, Pose, rotation_from_vector
 from mocks.physics.room import HOME_REFLECTOR, Distortions, Station
@@ -62,7 +63,7 @@ class World:
         self.faults = FaultSet()
         self.climate = Climate(plan.seed)
         self.station = Station(plan.seed, self.around.place)
-        self.distortions = Distortions(plan.hidden, self.around)
+        self.distortions = Distortions(plan.hidden, self.body)
         widths = play_widths(plan.hidden, self.body.limbs, self.body.stroke)
         self.legs = [LegMotion(self.clock, width) for width in widths]
         self.smrs = _smrs(plan, self.around)

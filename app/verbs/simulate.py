@@ -13,8 +13,8 @@ from app.prototype import simulate_prototype
 from calib.errors import BadInput
 from calib.mechanism.rigid import Poses
 from calib.mechanism.task import task_values
+from mocks.hidden.table import Hidden
 from mocks.physics.bodies import BODIES, body_named
-from mocks.physics.hidden import Hidden
 from mocks.physics.truth import read_parameters
 from mocks.simulate import Profile, RunPlan, SimulatedRun, simulate
 from mocks.simulate.files import write

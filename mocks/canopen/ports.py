@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from mocks.physics.actuators import Stroke
+from mocks.physics.circumstances import Stroke
 
 
 class Leg(Protocol):

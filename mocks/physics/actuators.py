@@ -1,18 +1,18 @@
-"""What every actuator gets wrong, whatever it moves: gain, cycle, lost motion, creep.
+"""What actuators get wrong, whatever they move: what is hidden, and how the live machine settles.
 
 "Extension" is added to what the actuator does; signs follow the catalogue of effects. Extensions
 are in the actuator's unit, mm or rad.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mocks.physics.hidden import Hidden
+from mocks.hidden.effect import Physics
+from mocks.hidden.table import Hidden
+from mocks.physics.circumstances import Circumstances, Stroke
 from mocks.physics.pose import Array
 
-REFERENCE_C = 20.0
-HYSTERESIS_WIDTHS = (0.3, 2.0, 8.0)
 CREEP_PER_STEP = 3e-4
 CREEP_TAU_S = 0.4
 RINGING = 0.03
@@ -40,49 +40,15 @@ class Load:
         return np.concatenate([weight, np.cross(turned, gravity)], axis=1)
 
 
-@dataclass(frozen=True)
-class Stroke:
-    """How large things are in an actuator's unit.
-
-    ``per_mm``: what moves the machine as 1 mm of a leg does; ``cycle``: period of the cyclic
-    error where none is given; ``speed``: per s; ``counts``: the drive's counts in a unit;
-    ``digits``: decimals of q in a file; ``smallest``: change that reverses an actuator.
-    """
-
-    per_mm: float = 1.0
-    cycle: float = 4.0
-    speed: float = 20.0
-    counts: float = 1e6
-    digits: int = 6
-    smallest: float = 1e-4
-
-
-MILLIMETRES = Stroke()
-RADIANS = Stroke(1.0 / 317.0, 2.0 * np.pi, 0.2, 1e9, 9, 1e-6)
-
-
-@dataclass(frozen=True)
-class Circumstances:
-    """What the actuators' errors depend on, at N instants.
-
-    ``extension`` s (N, n) as the encoders read it; ``play`` (N, n, K); ``step`` (N, n), the last
-    move; ``delay`` (N, n) s since it ended (negative while it lasts); temperatures (N,) deg C;
-    ``payload`` (N,) kg.
-    """
-
-    extension: Array
-    play: Array
-    step: Array
-    delay: Array
-    structure: Array
-    air: Array
-    payload: Array
-
-
 def play_widths(hidden: Hidden, limbs: tuple[str, ...], stroke: Stroke) -> Array:
-    """Full widths (n, K): the backlash, then the memory of the hysteresis."""
-    memory = np.tile(np.asarray(HYSTERESIS_WIDTHS) * stroke.per_mm, (len(limbs), 1))
-    return np.column_stack([np.abs(hidden.limbs("backlash.*", limbs)), memory])
+    """Full widths (n, K) of the play elements that the hidden effects need, one after the other."""
+    return np.concatenate([np.zeros((len(limbs), 0)), *_widths(hidden, limbs, stroke)], axis=1)
+
+
+def _widths(hidden: Hidden, limbs: tuple[str, ...], stroke: Stroke) -> list[Array]:
+    """Widths (n, K) for each hidden effect, K = 0 where it needs none."""
+    own = (effect.widths(hidden, limbs, stroke) for effect in hidden.effects)
+    return [np.zeros((len(limbs), 0)) if one is None else one for one in own]
 
 
 class ActuatorErrors:
@@ -98,34 +64,37 @@ class ActuatorErrors:
         self, hidden: Hidden, limbs: tuple[str, ...], stroke: Stroke, settles: bool
     ) -> None:
         self._settles, self._stroke = settles, stroke
-        self._gain = hidden.limbs("screw-pitch.*", limbs)
-        self._quadratic = hidden.limbs("unknown.screw-quadratic.*", limbs)
-        self._sin = hidden.limbs("screw-cyclic.*.sin", limbs)
-        self._cos = hidden.limbs("screw-cyclic.*.cos", limbs)
-        self._period = hidden.get("screw-cyclic.period", stroke.cycle)
-        # A negative backlash is not physical, but a file may ask for the mirrored sign.
-        self._backlash_sign = np.where(hidden.limbs("backlash.*", limbs) < 0.0, -1.0, 1.0)
-        self._hysteresis = hidden.limbs("unknown.hysteresis.*", limbs)
-        self._creep = hidden.get("settling.k")
-        self._creep_tau = hidden.get("settling.tau", 5.0)
+        self._hidden: list[tuple[Physics, slice]] = []
+        first = 0
+        for physics, widths in zip(
+            hidden.physics(limbs, stroke), _widths(hidden, limbs, stroke), strict=True
+        ):
+            self._hidden.append((physics, slice(first, first + widths.shape[1])))
+            first += widths.shape[1]
 
     def added(self, c: Circumstances) -> Array:
         """What is added to the extensions, (N, n)."""
-        s = c.extension
-        turn = 2.0 * np.pi * s / self._period
-        error = self._gain * s + self._quadratic * s**2
-        error = error + self._sin * np.sin(turn) + self._cos * np.cos(turn)
-        error = error + self._backlash_sign * c.play[:, :, 0]
-        widths = np.asarray(HYSTERESIS_WIDTHS) * self._stroke.per_mm
-        error = error + self._hysteresis * (c.play[:, :, 1:] / (0.5 * widths)).mean(axis=2)
-        return np.asarray(error + self._after_move(c))
+        error = np.zeros(c.extension.shape)
+        for physics, own in self._hidden:
+            if physics.extension is not None:
+                error = error + physics.extension(replace(c, play=c.play[:, :, own]))
+        return np.asarray(error + self._after_move(c)) if self._settles else error
+
+    @property
+    def yields(self) -> bool:
+        """Whether actuators give way under load."""
+        return any(physics.compliance is not None for physics, _ in self._hidden)
+
+    def compliance(self, c: Circumstances) -> Array:
+        """How much each gives way, (N, n), mm/N or rad/(N mm)."""
+        total = np.zeros(c.extension.shape)
+        for physics, _ in self._hidden:
+            if physics.compliance is not None:
+                total = total + physics.compliance(c)
+        return total
 
     def _after_move(self, c: Circumstances) -> Array:
-        since = np.maximum(c.delay, 0.0)
-        error = self._creep * c.step * np.exp(-since / self._creep_tau)
-        if self._settles:
-            unit = self._stroke.per_mm
-            error = error - CREEP_PER_STEP * c.step * np.exp(-since / CREEP_TAU_S)
-            swing = np.tanh(c.step / (RINGING_STEP * unit)) * np.exp(-since / RINGING_TAU_S)
-            error = error + RINGING * unit * swing * np.sin(2.0 * np.pi * RINGING_HZ * since)
-        return np.asarray(error)
+        since, unit = np.maximum(c.delay, 0.0), self._stroke.per_mm
+        creep = -CREEP_PER_STEP * c.step * np.exp(-since / CREEP_TAU_S)
+        swing = np.tanh(c.step / (RINGING_STEP * unit)) * np.exp(-since / RINGING_TAU_S)
+        return np.asarray(creep + RINGING * unit * swing * np.sin(2.0 * np.pi * RINGING_HZ * since))

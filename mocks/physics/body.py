@@ -7,8 +7,9 @@ from typing import Protocol
 import numpy as np
 
 from calib.mechanism.description import Machine
-from mocks.physics.actuators import Circumstances, Load, Stroke
-from mocks.physics.hidden import Hidden
+from mocks.hidden.table import Hidden
+from mocks.physics.actuators import Load
+from mocks.physics.circumstances import Circumstances, Stroke
 from mocks.physics.pose import Array, Pose
 
 Point = tuple[float, float, float]

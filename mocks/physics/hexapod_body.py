@@ -4,8 +4,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from mocks.physics.actuators import MILLIMETRES, Circumstances, Load
+from mocks.hidden.table import Hidden
+from mocks.physics.actuators import Load
 from mocks.physics.body import Place, Surroundings
+from mocks.physics.circumstances import MILLIMETRES, Circumstances
 from mocks.physics.hexapod import (
     HexapodGeometry,
     Legs,
@@ -15,7 +17,6 @@ from mocks.physics.hexapod import (
     legs,
 )
 from mocks.physics.hexapod_legs import LIMBS, LegErrors, lengths
-from mocks.physics.hidden import Hidden
 from mocks.physics.pose import Array, Pose, rotations_from_rpy
 from mocks.physics.truth import machine_file
 
@@ -80,7 +81,7 @@ class HexapodBody:
         self, parameters: Mapping[str, float], hidden: Hidden, load: Load, settles: bool
     ) -> RealHexapod:
         """A hexapod with these true parameters."""
-        hidden.check("hexapod", LIMBS, ("parallelogram-sides", "joint-azimuth", "redundancy"))
+        hidden.check("hexapod", LIMBS)
         return RealHexapod(true_geometry(parameters, hidden), LegErrors(hidden, load, settles))
 
 

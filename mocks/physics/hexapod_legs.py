@@ -5,15 +5,10 @@
 
 import numpy as np
 
-from mocks.physics.actuators import (
-    MILLIMETRES,
-    REFERENCE_C,
-    ActuatorErrors,
-    Circumstances,
-    Load,
-)
+from mocks.hidden.table import Hidden
+from mocks.physics.actuators import ActuatorErrors, Load
+from mocks.physics.circumstances import MILLIMETRES, REFERENCE_C, Circumstances
 from mocks.physics.hexapod import PHI_B_DEG, HexapodGeometry, Legs
-from mocks.physics.hidden import Hidden
 from mocks.physics.pose import Array, Pose
 
 LIMBS = tuple(f"leg{n}" for n in range(1, 7))
@@ -37,8 +32,6 @@ class LegErrors:
         self._growth = hidden.get("thermal-growth.a")
         self._bending = hidden.get("unknown.bending.k")
         self._twist_lead = hidden.get("screw-twist.L")
-        self._compliance = hidden.get("gravity-sag.c")
-        self._softness = hidden.get("unknown.soft-legs.k")
 
     def fixed(self, c: Circumstances) -> Array:
         """The part that does not depend on the pose, (N, 6), mm."""
@@ -54,7 +47,7 @@ class LegErrors:
     @property
     def depends_on_pose(self) -> bool:
         """Whether :meth:`with_pose` adds anything."""
-        return bool(self._twist_lead or self._compliance or self._softness)
+        return bool(self._twist_lead) or self._actuators.yields
 
     def with_pose(self, c: Circumstances, legs: Legs, pose: Pose, home_twist: Array) -> Array:
         """The part that depends on the pose, (N, 6), mm."""
@@ -63,9 +56,9 @@ class LegErrors:
             change = legs.twist() - home_twist
             change = (change + np.pi) % (2.0 * np.pi) - np.pi
             error += self._twist_lead / (2.0 * np.pi) * change
-        if self._compliance or self._softness:
+        if self._actuators.yields:
             force = axial_forces(legs, pose, self._load, c.payload)
-            error += (self._compliance + self._softness * c.extension) * force
+            error += self._actuators.compliance(c) * force
         return error
 
 

@@ -45,6 +45,8 @@ def follow(positions: Array, widths: Array) -> Array:
     array, shape (N, n, K), mm
     """
     out = np.zeros((*positions.shape, widths.shape[-1]))
+    if not out.size:
+        return out
     half = 0.5 * widths
     changes = np.diff(positions, axis=0)[:, :, None]
     for row, change in enumerate(changes):

@@ -4,25 +4,16 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from mocks.physics.actuators import (
-    RADIANS,
-    REFERENCE_C,
-    ActuatorErrors,
-    Circumstances,
-    Load,
-)
+from mocks.hidden.table import Hidden
+from mocks.physics.actuators import ActuatorErrors, Load
 from mocks.physics.body import Place, Surroundings
-from mocks.physics.hidden import Hidden
+from mocks.physics.circumstances import RADIANS, REFERENCE_C, Circumstances
 from mocks.physics.pose import Array, Pose
 from mocks.physics.ptm import LIMBS, PtmGeometry, geometry
 from mocks.physics.ptm_closure import Stance, at_home, close
 from mocks.physics.ptm_mirror import base_angles, normals, stance
 from mocks.physics.truth import machine_file
 
-ABSENT = (
-    "screw-twist", "joint-tilt", "parallelogram-sides", "joint-azimuth", "unknown.bending",
-    "unknown.soft-legs",
-)  # fmt: skip
 EQUAL = np.ones(4)
 POINTED_RAD = 1e-11
 MOST_STEPS = 12
@@ -52,7 +43,6 @@ class RealPtm:
         self._geometry = geometry(parameters)
         self._actuators = ActuatorErrors(hidden, LIMBS, RADIANS, settles)
         self._growth = hidden.get("thermal-growth.a")
-        self._compliance = hidden.get("gravity-sag.c")
         self._load = load
         self._stiffness = EQUAL.copy()
         if hidden.has("redundancy."):
@@ -72,18 +62,20 @@ class RealPtm:
         grown = 1.0 + self._growth * (c.structure - REFERENCE_C)
         # Many instants share a state: the same pose read at several nests is closed once.
         states, which = np.unique(
-            np.column_stack([angles, grown, c.payload]), axis=0, return_inverse=True
+            np.column_stack([angles, self._actuators.compliance(c), grown, c.payload]),
+            axis=0,
+            return_inverse=True,
         )
-        pose = self._closed(states[:, :2], states[:, 2], states[:, 3])
+        pose = self._closed(states[:, :2], states[:, 2:4], states[:, 4], states[:, 5])
         return Pose(pose.position[which], pose.rotation[which])
 
-    def _closed(self, angles: Array, grown: Array, payload: Array) -> Pose:
+    def _closed(self, angles: Array, compliance: Array, grown: Array, payload: Array) -> Pose:
         def motors(pose: Pose, by_motor: Array) -> Array:
-            if not self._compliance:
+            if not self._actuators.yields:
                 return angles
             wrench = self._load.wrench(pose.rotation, payload)
             torque = np.einsum("nij,ni->nj", by_motor, wrench)
-            return np.asarray(angles + self._compliance * torque)
+            return np.asarray(angles + compliance * torque)
 
         return close(self._geometry, motors, grown, self._stiffness, stance(angles)).pose
 
@@ -113,7 +105,7 @@ class PtmBody:
         self, parameters: Mapping[str, float], hidden: Hidden, load: Load, settles: bool
     ) -> RealPtm:
         """A tracking mechanism with these true errors."""
-        hidden.check("ptm", LIMBS, ABSENT)
+        hidden.check("ptm", LIMBS)
         return RealPtm(parameters, hidden, load, settles)
 
 

@@ -5,8 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from calib.mechanism.description import Machine
-from mocks.physics.actuators import Circumstances, Load, play_widths
+from mocks.physics.actuators import Load, play_widths
 from mocks.physics.body import Body
+from mocks.physics.circumstances import Circumstances
 from mocks.physics.play import follow
 from mocks.physics.pose import Array, Pose
 from mocks.physics.truth import nominal_parameters
@@ -60,12 +61,9 @@ def true_poses(
     ``payload_kg``, ``delay_s``.
     """
     widths = play_widths(plan.hidden, body.limbs, body.stroke)
-    play = np.zeros((*extension.shape, widths.shape[1]))
-    if plan.hidden.has("backlash.") or plan.hidden.has("unknown.hysteresis."):
-        play = follow(extension, widths)
     circumstances = Circumstances(
         extension=extension,
-        play=play,
+        play=follow(extension, widths),
         step=_last_step(extension, body.stroke.smallest),
         delay=np.repeat(channels["delay_s"][:, None], extension.shape[1], axis=1),
         structure=channels["structure_temp_C"],

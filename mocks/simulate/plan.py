@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
+from mocks.hidden.table import Hidden
 from mocks.physics.actuators import Load
-from mocks.physics.hidden import Hidden
 from mocks.physics.pose import Array
 
 Order = Literal["nest-by-nest", "pose-by-pose"]

@@ -7,7 +7,7 @@ import numpy as np
 
 from calib.mechanism.description import Machine
 from mocks.physics.bodies import body_named
-from mocks.physics.body import Surroundings
+from mocks.physics.body import Body
 from mocks.physics.pose import Array, Pose
 from mocks.physics.room import Distortions, Station
 from mocks.physics.signals import Wander, mean_variance
@@ -63,7 +63,7 @@ def simulate(plan: RunPlan) -> SimulatedRun:
     extension = q - body.reference(held)
     truth = machines.true_poses(body, parameters, plan, load, extension, channels)
     station = Station(plan.seed, around.place)
-    seen = _seen(plan, rows, truth, station, around)
+    seen = _seen(plan, rows, truth, station, body)
     covariance = _covariance(plan, seen)
     xyz = seen + _noise(plan, seen)
     strays = _strays(plan, rows, xyz)
@@ -106,11 +106,9 @@ def _columns(plan: RunPlan, channels: dict[str, Array]) -> dict[str, Array]:
     return {name: v for name, v in channels.items() if name != "delay_s" or delays}
 
 
-def _seen(
-    plan: RunPlan, rows: Layout, truth: Pose, station: Station, around: Surroundings
-) -> Array:
+def _seen(plan: RunPlan, rows: Layout, truth: Pose, station: Station, body: Body) -> Array:
     """What a noise-free tracker reads at every row, tracker frame, (R, 3), mm."""
-    distortions = Distortions(plan.hidden, around)
+    around, distortions = body.around, Distortions(plan.hidden, body)
     down = -truth.rotation[:, 2, :]
     names = np.array(rows.nest)
     base = np.tile([0.0, 0.0, 0.0], (names.size, 1))

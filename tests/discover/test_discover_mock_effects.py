@@ -15,7 +15,7 @@ from calib.identify.signatures import columns_at
 from calib.identify.staged import fit_effects
 from calib.runs import parse_run
 from calib.runs.stack import stack
-from mocks.physics.hidden import Hidden
+from mocks.hidden.table import Hidden
 from mocks.physics.truth import machine_file, nominal_parameters
 from mocks.simulate.files import points_csv, run_toml
 from mocks.simulate.plan import Profile, RunPlan

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.cli import run as pkmcal
-from mocks.physics.hidden import Hidden
+from mocks.hidden.table import Hidden
 from mocks.simulate import RunPlan, simulate
 from mocks.simulate.files import write
 

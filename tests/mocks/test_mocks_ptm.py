@@ -8,9 +8,10 @@ import pytest
 from app.files.machines import load_machine
 from calib.mechanism.solve import forward
 from calib.mechanism.variants import with_closure
-from mocks.physics.actuators import Circumstances, Load
+from mocks.hidden.table import Hidden
+from mocks.physics.actuators import Load
 from mocks.physics.bodies import body_named
-from mocks.physics.hidden import Hidden
+from mocks.physics.circumstances import Circumstances
 from mocks.physics.pose import Array
 from mocks.physics.ptm import geometry
 from mocks.physics.ptm_body import EQUAL, PtmBody

@@ -14,8 +14,8 @@ from calib.identify.staged import fit_effects
 from calib.runs import parse_run
 from calib.runs.stack import stack
 from mocks.clock import ManualClock
+from mocks.hidden.table import Hidden
 from mocks.physics.hexapod_body import AROUND
-from mocks.physics.hidden import Hidden
 from mocks.simulate import Profile, RunPlan, simulate
 from mocks.simulate.files import points_csv, run_toml, truth_json
 from mocks.simulate.run import SimulatedRun

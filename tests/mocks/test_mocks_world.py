@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mocks.clock import ManualClock
+from mocks.hidden.table import Hidden
 from mocks.physics.hexapod_body import AROUND
-from mocks.physics.hidden import Hidden
 from mocks.physics.pose import Array, rotation_from_rpy, rotation_from_vector
 from mocks.physics.room import Station as TrackerStation
 from mocks.physics.truth import nominal_parameters

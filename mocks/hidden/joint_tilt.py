@@ -1,0 +1,33 @@
+"""First axes of universal joints that point off, in the hexapod's body."""
+
+import numpy as np
+
+from mocks.hidden.effect import LIMB, HiddenEffect, Site, Table, of_names
+
+
+class JointTilt(HiddenEffect):
+    """Small turns about local y and z of each joint."""
+
+    id = "joint-tilt"
+    numbers = rf"{LIMB}\.(base|platform)\.(y|z)"
+    says = "rad: turn of a joint about its local y or z"
+    machines = ("hexapod",)
+    trial = 2e-3
+
+    def draw(self, site: Site, rng: np.random.Generator) -> Table:
+        """All joints."""
+        names = [
+            f"joint-tilt.{limb}.{body}.{axis}"
+            for limb in site.limbs
+            for body in ("base", "platform")
+            for axis in "yz"
+        ]
+        return of_names(names, rng)
+
+    def example(self, site: Site) -> Table:
+        """One joint at the base, one on the platform."""
+        one, two = site.limbs[1], site.limbs[-1]
+        return {f"joint-tilt.{one}.base.y": 2e-3, f"joint-tilt.{two}.platform.z": -2e-3}
+
+
+EFFECTS = (JointTilt(),)

@@ -1,0 +1,93 @@
+"""What is wrong with a mock machine beyond its parameters: a flat table of named numbers."""
+
+import json
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from mocks.hidden import effects
+from mocks.hidden.effect import LIMB, HiddenEffect, Physics
+from mocks.physics.circumstances import Stroke
+from mocks.physics.pose import Array
+
+
+class Hidden:
+    """A table of hidden effects.
+
+    Parameters
+    ----------
+    table : mapping
+        Names and numbers, nested or dotted; raises ValueError for a name that is not known.
+    """
+
+    def __init__(self, table: Mapping[str, object] | None = None) -> None:
+        self.values: dict[str, float] = dict(_flat(table or {}))
+        for name in self.values:
+            if _effect_of(name) is None:
+                raise ValueError(
+                    f'the mock knows no hidden effect "{name}"; '
+                    "names are those of the catalogue's parameters, or begin with unknown."
+                )
+
+    @classmethod
+    def read(cls, path: Path) -> "Hidden":
+        """Read a TOML or JSON file with a table ``hidden`` (or nothing but the table)."""
+        text = path.read_text(encoding="utf-8")
+        table = json.loads(text) if path.suffix == ".json" else tomllib.loads(text)
+        return cls(table.get("hidden", table))
+
+    @property
+    def effects(self) -> tuple[HiddenEffect, ...]:
+        """The effects of which any number is given."""
+        return tuple(effect for effect in effects() if self.has(f"{effect.id}."))
+
+    def physics(self, limbs: tuple[str, ...], stroke: Stroke) -> list[Physics]:
+        """What they add on any machine."""
+        return [effect.physics(self, limbs, stroke) for effect in self.effects]
+
+    def get(self, name: str, default: float = 0.0) -> float:
+        """One number; ``default`` where it is not given."""
+        return self.values.get(name, default)
+
+    def limbs(self, pattern: str, limbs: tuple[str, ...]) -> Array:
+        """One number for each limb: ``pattern`` with ``*`` for its name, (n,)."""
+        return np.array([self.get(pattern.replace("*", limb)) for limb in limbs])
+
+    def check(self, machine: str, limbs: tuple[str, ...]) -> None:
+        """Raise ValueError for what this machine does not have."""
+        for name in self.values:
+            limb, effect = re.search(LIMB, name), _effect_of(name)
+            absent = effect is not None and machine not in effect.machines
+            if absent or (limb is not None and limb.group() not in limbs):
+                raise ValueError(f'the mock {machine} has no hidden effect "{name}"')
+
+    def vector(self, stem: str, names: str = "x y z") -> Array:
+        """Numbers ``stem.x``, ``stem.y``, ..., (len(names),)."""
+        return np.array([self.get(f"{stem}.{name}") for name in names.split()])
+
+    def has(self, prefix: str) -> bool:
+        """Whether any number of this effect is given."""
+        return any(name.startswith(prefix) for name in self.values)
+
+
+@cache
+def _effect_of(name: str) -> HiddenEffect | None:
+    """The effect to which a number belongs; None if there is no such number."""
+    for effect in effects():
+        if re.fullmatch(rf"{re.escape(effect.id)}\.({effect.numbers})", name):
+            return effect
+    return None
+
+
+def _flat(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, float]]:
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}.")
+        elif isinstance(value, (int, float)) and not isinstance(value, bool):
+            yield prefix + key, float(value)
+        else:
+            raise ValueError(f'hidden effect "{prefix}{key}" must be a number, got {value!r}')
