@@ -34,7 +34,7 @@ def load_rows(
     """Read runs and find the effects that are asked for; raises BadInput with the place."""
     loaded = read_runs(runs)
     machine = loaded[0].machine
-    effects, _ = chosen_effects(machine, add, model)
+    effects = chosen_effects(machine, add, model)
     return stack(machine, [one.run for one in loaded]), effects
 
 

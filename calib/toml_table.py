@@ -110,9 +110,9 @@ class TomlTable:
         """Every key, in the order of the file."""
         return list(self._data)
 
-    def raw(self, key: str, kind: str = "any") -> Any:
+    def raw(self, key: str, kind: str = "any", *, required: bool = False) -> Any:
         """A value as it stands; None where it is missing."""
-        return self._get(key, Asked(kind, "", False, None))
+        return self._get(key, Asked(kind, "", required, None), f"{key} = ...")
 
     def format(self, *known: str) -> str:
         """Check the key ``format``, with which every file begins."""
@@ -219,13 +219,15 @@ class TomlTable:
         return float(value)
 
     def optional_number(
-        self, key: str, *, unit: str = "", above: float | None = None
+        self, key: str, *, unit: str = "", above: float | None = None, finite: bool = True
     ) -> float | None:
         """Read a number that may be left out without another taking its place."""
-        if key in self._data:
-            value = self.number(key, unit=unit, above=above)
+        value = self._get(key, Asked("number", unit, False, None))
+        if value is None or (not finite and isinstance(value, float)):
+            return value
+        value = self.number(key, unit=unit, above=above)
         self._note(key, Asked("number", unit, False, None))
-        return value if key in self._data else None
+        return value
 
     def whole(
         self, key: str, default: int | None = None, *, least: int = 0, most: int | None = None
@@ -250,6 +252,7 @@ class TomlTable:
         *,
         unit: str = "",
         most: float = LARGEST,
+        finite: bool = True,
     ) -> tuple[float, ...]:
         """Read a list of ``length`` numbers, none beyond ``most`` in either direction."""
         asked = Asked(f"{length} numbers", unit, default is None, default)
@@ -258,7 +261,10 @@ class TomlTable:
         if value is None:
             return default or ()
         good = isinstance(value, list) and len(value) == length
-        if not good or not all(_is_number(one) and abs(one) <= most for one in value):
+        if not good or not all(
+            (_is_number(one) and abs(one) <= most) or (not finite and isinstance(one, float))
+            for one in value
+        ):
             of = f" in {unit}" if unit else ""
             remedy = f"Write {length} finite numbers{of}, as {example}"
             raise self.wrong(f"{key} is {value!r}", key, remedy=remedy)
@@ -295,6 +301,16 @@ class TomlTable:
                     remedy="Expected a finite number",
                 )
         return {name: float(value) for name, value in found.items()}
+
+    def numbers_here(self) -> dict[str, float]:
+        """Every number of this table by its key; what is no number is left alone."""
+        if self._named:
+            self._note("", Asked("number", "", False, None))
+        return {
+            key: float(value)
+            for key, value in self._data.items()
+            if isinstance(value, float) or (isinstance(value, int) and abs(value) <= LARGEST)
+        }
 
     def place_of_name(self, name: str) -> str:
         """Where a name of :meth:`numbers_by_name` stands, in a table read by :meth:`named`."""

@@ -1,25 +1,26 @@
-"""What a fit found, read back for the write-back: a model file, or the JSON answer of ``fit``.
+"""Model files: what a fit found, read back by every verb that takes one.
 
-``pkmcal fit --save FILE`` writes TOML (``pkm-model/1``) with correlations; ``pkmcal fit --json``
-answers JSON (``pkm-fit/1``) without them.
+``pkmcal fit --save FILE`` writes TOML (``pkm-model/1``, described in docs/model-file.md) with
+correlations; ``pkmcal fit --json`` answers JSON (``pkm-fit/1``) without them. Either is read.
 """
 
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.files.text import read_text
+from calib.arrays import Array
 from calib.errors import BadInput
-from calib.toml_place import load_toml
+from calib.toml_table import TomlTable
 from calib.unknown import Estimate, Unknown
 
-Array = NDArray[np.float64]
+MODEL_FORMAT = "pkm-model/1"
+FIT_FORMAT = "pkm-fit/1"
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,8 @@ class SavedFit:
     correlated: bool
     compensation: Mapping[str, float] | None = None
     """What the controller compensated while the runs were taken; None if the file is silent."""
+    own: Mapping[str, str] = field(default_factory=dict)
+    """Texts of the operator's own effects by their id: with them the file is complete."""
 
     def covariance_of(self, names: list[str]) -> Array:
         """Covariance of some parameters, in that order."""
@@ -50,83 +53,78 @@ class SavedFit:
 
 
 def read_fit(path: Path) -> SavedFit:
-    """Read a saved fit; raises :class:`BadInput` naming the file and what is wrong with it."""
-    text = read_text(path)
-    source = str(path)
-    data = _json(text, source) if text.lstrip().startswith("{") else load_toml(text, source)
-    if data.get("format") not in ("pkm-model/1", "pkm-fit/1"):
-        raise BadInput(
-            f"format is {data.get('format')!r}",
-            place=source,
-            remedy="Give the file that pkmcal fit --save wrote",
-        )
-    try:
-        estimates = {entry["name"]: _estimate(entry) for entry in data["parameters"]}
-        quality = {**data.get("quality", {}), **data}
-        quality = {k: float(v) for k, v in quality.items() if isinstance(v, int | float)}
-        effects = tuple(str(effect) for effect in data.get("effects", []))
-    except (KeyError, TypeError, ValueError) as error:
-        raise BadInput(
-            f"its parameters cannot be read ({error})", place=source, remedy="Fit again"
-        ) from error
-    if not estimates:
-        raise BadInput("it holds no parameters", place=source, remedy="Fit again with --save")
-    covariance, correlated = _covariance(estimates, data.get("correlations"), source)
-    machine = str(data.get("machine", ""))
+    """Read a saved fit; raises :class:`BadInput` naming file, line and what is wrong with it."""
+    return parse_fit(read_text(path), str(path))
+
+
+def parse_fit(text: str, source: str) -> SavedFit:
+    """Check the text of a saved fit, TOML or JSON."""
+    if text.lstrip().startswith("{"):
+        return fit_of(TomlTable(_json(text, source), text, source), source)
+    return fit_of(TomlTable.parse(text, source), source)
+
+
+def fit_of(top: TomlTable, source: str) -> SavedFit:
+    """Check the tables of a saved fit; keys that are not asked for are left alone."""
+    top.format(MODEL_FORMAT, FIT_FORMAT)
+    estimates: dict[str, Estimate] = {}
+    for entry in top.tables("parameters"):
+        found = _estimate(entry)
+        if found.name in estimates:
+            raise entry.wrong(f'"{found.name}" is there twice', "name", remedy="Fit again")
+        estimates[found.name] = found
+    correlation = _correlation(top, list(estimates))
+    sigma = np.array([estimate.sigma for estimate in estimates.values()], dtype=float)
+    own = top.named("own_effects", required=False)
     return SavedFit(
-        source,
-        machine,
-        effects,
-        estimates,
-        quality,
-        covariance,
-        correlated,
-        _compensation(data.get("compensation"), source),
+        source=source,
+        machine=top.text("machine", ""),
+        effects=tuple(top.texts("effects")),
+        estimates=estimates,
+        quality={**top.named("quality", required=False).numbers_here(), **top.numbers_here()},
+        covariance=correlation * sigma[:, None] * sigma,
+        correlated=top.has("correlations"),
+        compensation=top.numbers_by_name("compensation") if top.has("compensation") else None,
+        own={name: own.text(name) for name in own},
     )
-
-
-def _compensation(table: Any, source: str) -> dict[str, float] | None:
-    if table is None:
-        return None
-    try:
-        return {str(name): float(value) for name, value in table.items()}
-    except (AttributeError, TypeError, ValueError) as error:
-        raise BadInput(
-            f"its compensation cannot be read ({error})", place=source, remedy="Fit again"
-        ) from error
 
 
 def _json(text: str, source: str) -> dict[str, Any]:
+    """The object of a JSON text; ``null`` says the same as a key that is left out."""
     try:
-        data: dict[str, Any] = json.loads(text)
-    except ValueError as error:
-        raise BadInput(f"not JSON: {error}", place=source) from error
+        data = json.loads(text, object_pairs_hook=_without_nulls)
+    except (ValueError, RecursionError) as error:
+        line = getattr(error, "lineno", 1)
+        raise BadInput(
+            f"not JSON: {error}", place=f"{source}, line {line}", remedy="Fit again"
+        ) from error
+    assert isinstance(data, dict), "the text begins with a brace"
     return data
 
 
-def _estimate(entry: Mapping[str, Any]) -> Estimate:
-    value, sigma = entry["value"], entry["sigma"]
+def _without_nulls(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    return {name: value for name, value in pairs if value is not None}
+
+
+def _estimate(entry: TomlTable) -> Estimate:
+    value = entry.optional_number("value", finite=False)
+    sigma = entry.optional_number("sigma", finite=False)
     return Estimate(
-        Unknown(str(entry["name"]), str(entry.get("unit", ""))),
-        math.nan if value is None else float(value),
-        math.nan if sigma is None else float(sigma),
-        bool(entry.get("identified", True)),
+        Unknown(entry.text("name"), entry.text("unit", "")),
+        math.nan if value is None else value,
+        math.nan if sigma is None else sigma,
+        entry.flag("identified", True),
     )
 
 
-def _covariance(
-    estimates: Mapping[str, Estimate], correlations: Any, source: str
-) -> tuple[Array, bool]:
-    sigma = np.array([estimate.sigma for estimate in estimates.values()])
-    correlation = np.eye(sigma.size)
-    if correlations is not None:
-        try:
-            for i, name in enumerate(estimates):
-                row = np.array(correlations[name], float)
-                correlation[i, : i + 1] = row
-                correlation[: i + 1, i] = row
-        except (KeyError, TypeError, ValueError) as error:
-            raise BadInput(
-                f"its correlations cannot be read ({error})", place=source, remedy="Fit again"
-            ) from error
-    return correlation * sigma[:, None] * sigma, correlations is not None
+def _correlation(top: TomlTable, names: list[str]) -> Array:
+    """Correlations (p, p) from the rows of their lower triangle; the unit matrix without them."""
+    correlation = np.eye(len(names))
+    if not top.has("correlations"):
+        return correlation
+    rows = top.named("correlations")
+    for i, name in enumerate(names):
+        row = np.array(rows.numbers(name, i + 1, finite=False), dtype=float)
+        correlation[i, : i + 1] = row
+        correlation[: i + 1, i] = row
+    return correlation

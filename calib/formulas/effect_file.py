@@ -23,7 +23,6 @@ An unknown in which the formula is not linear is searched for and needs a range:
 
 import math
 import re
-from typing import Any
 
 from calib.effects.component import Kind
 from calib.errors import BadInput
@@ -35,11 +34,10 @@ from calib.formulas.expression import (
     vanishes_without,
 )
 from calib.formulas.formula_effect import NUMBERED, OWN, POINT, TRIALS, OperatorEffect
-from calib.toml_place import line_of, load_toml
+from calib.toml_table import TomlTable
 from calib.unknown import Unknown
 
 KINDS = ("machine", "measurement")
-_RANGE = ("from", "to")
 
 
 def effect_from_text(text: str, source: str) -> OperatorEffect:
@@ -57,142 +55,117 @@ def effect_from_text(text: str, source: str) -> OperatorEffect:
     BadInput
         Naming file, line and, for a fault in a formula, its column.
     """
-    table = load_toml(text, source).get("effect")
-    if not isinstance(table, dict):
+    return effect_of(TomlTable.parse(text, source), text, source)
+
+
+def effect_of(top: TomlTable, text: str, source: str) -> OperatorEffect:
+    """Read the table [effect] of a file, see :func:`effect_from_text`."""
+    if not top.has("effect"):
         raise BadInput("there is no table [effect]", place=source, remedy="Begin with [effect]")
-    read = _Reader(table, text, source)
-    acts_on = read.text("acts_on", "actuator", ("actuator", "point"))
+    table = top.table("effect")
+    table.only("id", "says", "acts_on", "expression", "unknowns", "shared", "kind", "axes")
+    acts_on = table.choice("acts_on", ("actuator", "point"), "actuator")
     usual = "machine" if acts_on == "actuator" else "measurement"
-    kind: Kind = "machine" if read.text("kind", usual, KINDS) == "machine" else "measurement"
-    declared = read.unknowns()
-    expressions = read.expressions(acts_on)
+    kind: Kind = "machine" if table.choice("kind", KINDS, usual) == "machine" else "measurement"
+    declared = _unknowns(table)
     effect = OperatorEffect(
-        read.identifier(), read.text("says", "an operator's own effect"), kind,
-        expressions, declared, read.flag("shared"), acts_on, source, read.axes(acts_on),
-    )  # fmt: skip
-    _check(effect, declared, read)
+        _identifier(table),
+        table.text("says", "an operator's own effect"),
+        kind,
+        _expressions(table, acts_on),
+        declared,
+        table.flag("shared", False),
+        acts_on,
+        source,
+        _axes(table, acts_on),
+        text,
+    )
+    _check(effect, declared, table)
     return effect
 
 
-def _check(effect: OperatorEffect, declared: tuple[Unknown, ...], read: "_Reader") -> None:
+def _check(effect: OperatorEffect, declared: tuple[Unknown, ...], table: TomlTable) -> None:
     """Every unknown is used, does something linear or has a range, and zero means no effect."""
     for one in declared:
         if not any(one.name in expression.names for expression in effect.expressions):
-            raise read.fault("unknowns", f"the unknown {one.name!r} is not in the expression")
+            raise table.wrong(f"the unknown {one.name!r} is not in the expression", "unknowns")
     for one in effect.searched:
         if one.bounds is None:
-            raise read.fault(
-                "unknowns",
+            raise table.wrong(
                 f"the expression is not linear in {one.name!r}",
-                f'It must be searched: {one.name} = {{ unit = "{one.unit}", from = 1, to = 100 }}',
+                "unknowns",
+                remedy=f"It must be searched: {one.name} = "
+                f'{{ unit = "{one.unit}", from = 1, to = 100 }}',
             )
     linear = tuple(one.name for one in effect.linear)
     for expression in effect.expressions:
         if expression.text.strip() not in ("0", "0.0") and not vanishes_without(expression, linear):
-            raise read.fault(
-                "expression",
+            raise table.wrong(
                 f"the expression {expression.text!r} has a term without a linear unknown",
-                "With its unknowns at zero an effect must do nothing: multiply every term by one",
+                "expression",
+                remedy="With its unknowns at zero an effect must do nothing: "
+                "multiply every term by one",
             )
 
 
-class _Reader:
-    """The table [effect] of a file, every fault with its line."""
-
-    def __init__(self, table: dict[str, Any], text: str, source: str) -> None:
-        self.table, self.source, self.whole = table, source, text
-        known = {"id", "says", "acts_on", "expression", "unknowns", "shared", "kind", "axes"}
-        for key in table:
-            if key not in known:
-                raise self.fault(key, f"unknown key {key!r}", f"Known: {', '.join(sorted(known))}")
-
-    def fault(self, key: str, what: str, remedy: str = "") -> BadInput:
-        return BadInput(what, place=self.place(key), remedy=remedy)
-
-    def place(self, key: str) -> str:
-        return f"{self.source}, line {line_of(self.whole, 'effect', key)}, {key}"
-
-    def text(self, key: str, default: str, choice: tuple[str, ...] = ()) -> str:
-        value = self.table.get(key, default)
-        if not isinstance(value, str) or not value.strip() or (choice and value not in choice):
-            expected = " or ".join(choice) if choice else "text"
-            raise self.fault(key, f"{key} is {value!r}", f"Expected {expected}")
-        return value
-
-    def identifier(self) -> str:
-        value = self.table.get("id", "")
-        if not isinstance(value, str) or not re.fullmatch(r"[a-z][a-z0-9-]*", value):
-            raise self.fault(
-                "id", f"id is {value!r}", "Expected small letters, digits and hyphens: my-effect"
-            )
-        return value
-
-    def flag(self, key: str) -> bool:
-        value = self.table.get(key, False)
-        if not isinstance(value, bool):
-            raise self.fault(key, f"{key} is {value!r}", "Expected true or false")
-        return value
-
-    def axes(self, acts_on: str) -> tuple[str, ...]:
-        value = self.table.get("axes", [])
-        if not isinstance(value, list) or not all(isinstance(one, str) for one in value):
-            raise self.fault("axes", f"axes is {value!r}", 'Write axes = ["leg1", "leg4"]')
-        if value and acts_on != "actuator":
-            raise self.fault("axes", "a point has no axes", "Leave axes out")
-        return tuple(dict.fromkeys(value))
-
-    def expressions(self, acts_on: str) -> tuple[Expression, ...]:
-        value = self.table.get("expression")
-        whole = value if isinstance(value, list) else [value]
-        given = [one for one in whole if isinstance(one, str)]
-        if len(given) != len(whole) or len(given) not in (1, 3):
-            raise self.fault("expression", f"expression is {value!r}", 'Write "k * s**2"')
-        if len(given) == 3 and acts_on != "point":
-            raise self.fault(
-                "expression", "three expressions are for points", "Give one for actuators"
-            )
-        return tuple(parse_expression(one, self.place("expression")) for one in given)
-
-    def unknowns(self) -> tuple[Unknown, ...]:
-        table = self.table.get("unknowns")
-        if not isinstance(table, dict) or not table:
-            raise self.fault("unknowns", "no unknowns are declared", 'Write { k = "1/mm" }')
-        return tuple(self._unknown(name, value) for name, value in table.items())
-
-    def _unknown(self, name: str, value: object) -> Unknown:
-        taken = {*OWN, *POINT, *FUNCTIONS, *CONSTANTS, "t"}
-        if not re.fullmatch(r"[A-Za-z_]\w*", name) or name in taken or NUMBERED.fullmatch(name):
-            raise self.fault("unknowns", f"an unknown cannot be called {name!r}", "Rename it")
-        if isinstance(value, str):
-            return Unknown(name, value, steps=TRIALS)
-        if not isinstance(value, dict) or not isinstance(value.get("unit", ""), str):
-            raise self.fault("unknowns", f"{name} is {value!r}", f'Write {name} = "its unit"')
-        extra = set(value) - {"unit", "size", "sigma", "from", "to", "steps"}
-        if extra:
-            raise self.fault("unknowns", f"{name} has an unknown key {min(extra)!r}")
-        size, sigma = (self._number(name, key, value.get(key)) for key in ("size", "sigma"))
-        low, high = (self._number(name, key, value.get(key), any_sign=True) for key in _RANGE)
-        if (low is None) != (high is None) or (
-            low is not None and high is not None and low >= high
-        ):
-            raise self.fault("unknowns", f"{name}: from and to are no range", "Give from < to")
-        steps = value.get("steps", TRIALS)
-        if not isinstance(steps, int) or isinstance(steps, bool) or not 2 <= steps <= 400:
-            raise self.fault("unknowns", f"{name}: steps is {steps!r}", "Expected 2 to 400")
-        bounds = None if low is None or high is None else (low, high)
-        return Unknown(
-            name,
-            value.get("unit", "1"),
-            math.nan if size is None else size,
-            sigma,
-            bounds=bounds,
-            steps=steps,
+def _identifier(table: TomlTable) -> str:
+    value = table.text("id")
+    if not re.fullmatch(r"[a-z][a-z0-9-]*", value):
+        raise table.wrong(
+            f"id is {value!r}", "id", remedy="Write small letters, digits and hyphens: my-effect"
         )
+    return value
 
-    def _number(self, name: str, key: str, value: object, any_sign: bool = False) -> float | None:
-        if value is None:
-            return None
-        good = isinstance(value, int | float) and not isinstance(value, bool)
-        if good and math.isfinite(float(value)) and (any_sign or float(value) > 0):  # type: ignore[arg-type]
-            return float(value)  # type: ignore[arg-type]
-        raise self.fault("unknowns", f"{name}: {key} is {value!r}", "Expected a positive number")
+
+def _axes(table: TomlTable, acts_on: str) -> tuple[str, ...]:
+    names = table.texts("axes")
+    if names and acts_on != "actuator":
+        raise table.wrong("a point has no axes", "axes", remedy="Leave axes out")
+    return tuple(dict.fromkeys(names))
+
+
+def _expressions(table: TomlTable, acts_on: str) -> tuple[Expression, ...]:
+    value = table.raw("expression", "text or 3 texts", required=True)
+    whole = value if isinstance(value, list) else [value]
+    given = [one for one in whole if isinstance(one, str)]
+    if len(given) != len(whole) or len(given) not in (1, 3):
+        raise table.wrong(f"expression is {value!r}", "expression", remedy='Write "k * s**2"')
+    if len(given) == 3 and acts_on != "point":
+        raise table.wrong(
+            "three expressions are for points", "expression", remedy="Give one for actuators"
+        )
+    return tuple(parse_expression(one, table.place("expression")) for one in given)
+
+
+def _unknowns(table: TomlTable) -> tuple[Unknown, ...]:
+    unknowns = table.named("unknowns", required=False)
+    if not unknowns.names():
+        raise table.wrong("no unknowns are declared", "unknowns", remedy='Write { k = "1/mm" }')
+    return tuple(_unknown(unknowns, name) for name in unknowns)
+
+
+def _unknown(unknowns: TomlTable, name: str) -> Unknown:
+    taken = {*OWN, *POINT, *FUNCTIONS, *CONSTANTS, "t"}
+    if not re.fullmatch(r"[A-Za-z_]\w*", name) or name in taken or NUMBERED.fullmatch(name):
+        raise unknowns.wrong(f"an unknown cannot be called {name!r}", name, remedy="Rename it")
+    value = unknowns.raw(name, "text or table")
+    if isinstance(value, str):
+        return Unknown(name, value, steps=TRIALS)
+    if not isinstance(value, dict):
+        raise unknowns.wrong(f"{name} is {value!r}", name, remedy=f'Write {name} = "its unit"')
+    about = unknowns.table(name)
+    about.only("unit", "size", "sigma", "from", "to", "steps")
+    size = about.optional_number("size", above=0.0)
+    low, high = about.optional_number("from"), about.optional_number("to")
+    if (low is None) != (high is None) or (low is not None and high is not None and low >= high):
+        raise about.wrong(
+            f"{name}: from and to are no range", "from", remedy="Give both, from < to"
+        )
+    return Unknown(
+        name,
+        about.text("unit", "1"),
+        math.nan if size is None else size,
+        about.optional_number("sigma", above=0.0),
+        bounds=None if low is None or high is None else (low, high),
+        steps=about.whole("steps", TRIALS, least=2, most=400),
+    )

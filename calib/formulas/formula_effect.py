@@ -39,10 +39,12 @@ class OperatorEffect(Effect):
         acts_on: str,
         source: str,
         axes: tuple[str, ...] = (),
+        text: str = "",
     ) -> None:
         self.id, self.says, self.kind = identifier, says, kind
         self.expressions, self.shared, self.acts_on = expressions, shared, acts_on
         self.source, self.only = source, axes
+        self.text = text  # of the whole file: a model that is saved stays complete
         names = tuple(one.name for one in declared)
         linear = {n for e in expressions for n in linear_unknowns(e, names)}
         for expression in expressions:

@@ -126,7 +126,7 @@ def edited(old, new):
         (edited("k * s**2", "sin(k * s)"), "line 7", "not linear in 'k'"),
         (edited('k = "1/mm"', 's = "1/mm"'), "line 7", "cannot be called 's'"),
         (edited('acts_on = "actuator"', 'acts_on = "leg"'), "line 5", "acts_on is 'leg'"),
-        (edited('acts_on = "actuator"', "colour = 1"), "line 5", "unknown key 'colour'"),
+        (edited('acts_on = "actuator"', "colour = 1"), "line 5", "unknown key \"colour\""),
         (edited('id = "screw-quadratic"', 'id = "My Effect"'), "line 3", "id is"),
         ("[effect", "line 1", "not valid TOML"),
         ("a = 1", "e.toml", "no table"),
