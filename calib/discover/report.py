@@ -1,6 +1,5 @@
 """What diagnosis and discovery say: ``pkm-diagnosis/1`` and ``pkm-discovery/1``, and in words."""
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,11 +12,10 @@ from calib.discover.discovery import stage_of
 from calib.evidence.findings import Diagnosis, Finding
 from calib.evidence.forward import Discovery
 from calib.identify.fitting import Fit
-from calib.identify.report import bad_readings, quality
+from calib.identify.report import bad_readings, quality, um
 from calib.identify.starting import MOVED
 from calib.unknown import Estimate, estimates_of, linear_among
 
-SMALLEST_P = 1e-300
 FEW_POSES = 15
 
 
@@ -72,8 +70,8 @@ def _groups(discovery: Discovery) -> list[tuple[str, ...]]:
 def _quality(found: RunDiagnosis) -> dict[str, float | None]:
     return {
         **quality(found.fit),
-        "holdout_rms_um": _um(found.holdout.rms_mm),
-        "holdout_floor_um": _um(found.holdout.floor_mm),
+        "holdout_rms_um": um(found.holdout.rms_mm),
+        "holdout_floor_um": um(found.holdout.floor_mm),
     }
 
 
@@ -81,9 +79,9 @@ def _candidate(found: RunDiagnosis, finding: Finding) -> dict[str, Any]:
     outlook = found.outlook(finding)
     return {
         "effect": finding.name,
-        "p_value": max(finding.p_value, SMALLEST_P),
-        "rms_after_um": _um(outlook.rms_mm),
-        "holdout_rms_after_um": _um(outlook.holdout.rms_mm),
+        "p_value": finding.p_value,
+        "rms_after_um": um(outlook.rms_mm),
+        "holdout_rms_after_um": um(outlook.holdout.rms_mm),
         "visible": finding.visible,
         "parameters": _significant(outlook.estimates, finding.acting),
     }
@@ -211,8 +209,3 @@ def _depends(diagnosis: Diagnosis) -> str:
 
 def _readings(count: int) -> str:
     return "One reading is" if count == 1 else f"{count} readings are"
-
-
-def _um(millimetres: float) -> float | None:
-    value = 1000.0 * millimetres
-    return value if math.isfinite(value) else None

@@ -14,12 +14,11 @@ from itertools import pairwise
 import numpy as np
 
 from calib.arrays import Array
-from calib.evidence.bayes import observed
-from calib.evidence.candidate import Candidate
-from calib.evidence.diagnosis import ALPHA, DRAWS
-from calib.evidence.family import family
+from calib.evidence.diagnosis import DRAWS
+from calib.evidence.family import ALPHA, family, p_of, significant
 from calib.evidence.problem import LinearProblem
 from calib.evidence.quadratic import Quadratic
+from calib.evidence.rounds import signature_of
 from calib.evidence.scores import Scores, score
 from calib.evidence.structure import Response, Variable, structure_candidates
 
@@ -105,7 +104,9 @@ def compare_structure(
     rng : numpy Generator
         Draws the null distribution.
     """
-    named = [(variable, found) for variable in variables for found in _candidates(variable)]
+    named = [
+        (variable, found) for variable in variables for found in structure_candidates([variable])
+    ]
     scores = score(problem, [found for _, found in named], rng, DRAWS)
     tests = [test.level(scores.residuals) for test in quadratic]
     levels = [*scores.levels, *tests]
@@ -124,20 +125,8 @@ def compare_structure(
     together = []
     for number, test in enumerate(quadratic):
         log_p = joint.log_p(float(joint.strengths[len(named) + number, 0]))
-        together.append(JointTest(test.channel, _p(log_p), _below(log_p, alpha)))
+        together.append(JointTest(test.channel, p_of(log_p), significant(log_p, alpha)))
     return speaking, together
-
-
-def _candidates(variable: Variable) -> list[Candidate]:
-    return structure_candidates([variable])
-
-
-def _p(log_p: float) -> float:
-    return float(np.exp(max(log_p, -690.0)))
-
-
-def _below(log_p: float, alpha: float) -> bool:
-    return bool(log_p <= np.log(alpha) + 1e-9)
 
 
 def _speaking(
@@ -145,13 +134,8 @@ def _speaking(
 ) -> Speaking:
     """Describe the dependence behind one candidate."""
     candidate = scores.candidates[index]
-    _, parts = observed(scores, index)
-    number = int(np.argmax([part[:, 0].max() for part in parts]))
-    trial = int(np.argmax(parts[number][:, 0]))
-    subset = candidate.hypotheses[number]
-    weighing = scores.weighings[index][number]
-    beta, _ = scores.estimate(index, trial, subset)
-    whitened = weighing.whiten[trial] @ scores.scores[index][trial, list(subset), 0]
+    signature, number, trial = signature_of(scores, index)
+    fall, dof = scores.fall(index, number, trial)
     acts_on = candidate.name.partition("(")[2].rstrip(")").partition(",")[0]
     response = next(each for each in variable.responses if each.name == acts_on)
     period = candidate.trials[trial][0] if candidate.trials[trial] else None
@@ -168,11 +152,11 @@ def _speaking(
         acts_on=acts_on,
         axis=axis,
         unit=response.scale(axis)[0],
-        p_value=_p(log_p),
-        significant=_below(log_p, alpha),
-        chi2_fall=float(whitened @ whitened),
-        dof=int(weighing.dof[trial]),
-        fitted=scores.problem.project(beta @ candidate.columns[trial, list(subset)]),
+        p_value=p_of(log_p),
+        significant=significant(log_p, alpha),
+        chi2_fall=fall,
+        dof=dof,
+        fitted=scores.problem.project(signature),
         period=period,
         bins=pictures[axis],
     )

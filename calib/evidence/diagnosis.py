@@ -12,6 +12,7 @@ import numpy as np
 from calib.arrays import Array
 from calib.evidence.bayes import observed
 from calib.evidence.candidate import Candidate
+from calib.evidence.family import ALPHA, significant
 from calib.evidence.findings import Dependence, Diagnosis, Finding, Unexplained
 from calib.evidence.pairs import rivals
 from calib.evidence.problem import LinearProblem
@@ -25,10 +26,8 @@ from calib.evidence.rounds import (
     signature_of,
 )
 from calib.evidence.scores import Scores, score
-from calib.evidence.weighing import chi_squares
 from calib.unknown import estimates_of
 
-ALPHA = 0.05
 DRAWS = 399
 FIRST_DRAWS = 99
 IN_QUESTION = 7.0
@@ -123,8 +122,7 @@ def _in_question(judged: Round, best: int, alpha: float) -> list[int]:
 def _finding(judged: Round, index: int, evidence: float) -> Finding:
     scores, candidate = judged.scores, judged.scores.candidates[index]
     signature, number, trial = signature_of(scores, index)
-    subset = candidate.hypotheses[number]
-    weighing = scores.weighings[index][number]
+    fall, dof = scores.fall(index, number, trial)
     beta, covariance = scores.estimate(index, trial, candidate.hypotheses[0])
     sigmas = np.sqrt(np.diag(covariance))
     return Finding(
@@ -132,10 +130,10 @@ def _finding(judged: Round, index: int, evidence: float) -> Finding:
         name=candidate.name,
         log_p=judged.log_p(index),
         log_evidence=evidence,
-        chi2_fall=float(chi_squares(weighing, scores.scores[index][:, :, :1])[trial, 0]),
-        dof=int(weighing.dof[trial]),
+        chi2_fall=fall,
+        dof=dof,
         trial=candidate.trials[trial],
-        acting=tuple(candidate.unknowns[index].name for index in subset),
+        acting=tuple(candidate.unknowns[index].name for index in candidate.hypotheses[number]),
         estimates=estimates_of(candidate.unknowns, beta, sigmas),
         visible=scores.problem.visible(candidate.sizes[:, None] * candidate.columns[trial]),
         signature=signature,
@@ -151,7 +149,7 @@ def _unexplained(judged: Round, quadratic: Sequence[Quadratic], alpha: float) ->
     for index in range(len(judged.effects), count + len(quadratic)):
         log_p = judged.log_p(index)
         smallest = min(smallest, log_p)
-        if log_p > np.log(alpha) + 1e-9:
+        if not significant(log_p, alpha):
             continue
         if index < count:
             here = _dependence(scores, index, log_p)

@@ -18,6 +18,8 @@ import numpy as np
 from calib.arrays import Array
 from calib.evidence.tails import log_any, looks
 
+ALPHA = 0.05
+"""Family-wise false alarm."""
 ENOUGH = 10
 """Draws that must exceed the observation for their count to be used instead of the tail."""
 
@@ -53,6 +55,16 @@ class Family:
     def critical(self, alpha: float) -> float:
         """Strength that a candidate must exceed for a family-wise p of ``alpha``."""
         return float(np.quantile(self.highest, 1.0 - alpha, method="higher"))
+
+
+def significant(log_p: float, alpha: float) -> bool:
+    """Whether a p-value is no larger than ``alpha``; rounding of a count of draws aside."""
+    return bool(log_p <= np.log(alpha) + 1e-9)
+
+
+def p_of(log_p: float) -> float:
+    """A p-value, no smaller than 1e-300."""
+    return float(np.exp(max(log_p, -690.0)))
 
 
 def family(levels: list[Array], weights: Array) -> Family:

@@ -2,10 +2,8 @@
 
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from calib.arrays import Array
-from calib.evidence.family import Family
+from calib.evidence.family import Family, p_of
 from calib.evidence.scores import Scores
 from calib.unknown import Estimate
 
@@ -51,7 +49,7 @@ class Finding:
     @property
     def p_value(self) -> float:
         """Family-wise p-value, no smaller than 1e-300."""
-        return float(np.exp(max(self.log_p, -690.0)))
+        return p_of(self.log_p)
 
 
 @dataclass(frozen=True)

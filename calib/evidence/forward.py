@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from calib.evidence.diagnosis import ALPHA
+from calib.evidence.family import ALPHA, significant
 from calib.evidence.findings import Diagnosis
 
 MOST_STEPS = 8
@@ -120,8 +120,8 @@ def _next(stage: Stage, refused: Sequence[str]) -> str | None:
     diagnosis = stage.diagnosis
     if diagnosis.unknown_preferred or not diagnosis.explained_by:
         return None
-    significant = [found.name for found in diagnosis.findings if found.p_value <= ALPHA]
-    offered = (*diagnosis.explained_by, *significant)
+    called_for = [f.name for f in diagnosis.findings if significant(f.log_p, ALPHA)]
+    offered = (*diagnosis.explained_by, *called_for)
     return next((name for name in offered if name not in refused), None)
 
 

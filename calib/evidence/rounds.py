@@ -8,10 +8,9 @@ import numpy as np
 
 from calib.arrays import Array
 from calib.evidence.bayes import observed
-from calib.evidence.family import Family, family
+from calib.evidence.family import Family, family, significant
 from calib.evidence.quadratic import Quadratic
 from calib.evidence.scores import Scores
-from calib.evidence.weighing import chi_squares
 
 STRUCTURE_SHARE = 0.05
 """Part of the false alarms that structure of unknown origin may cause; effects have the rest."""
@@ -34,8 +33,7 @@ class Round:
 
     def significant(self, alpha: float) -> list[int]:
         """Effects whose family-wise p-value is no larger than alpha."""
-        limit = np.log(alpha) + 1e-9
-        return [index for index in self.effects if self.log_p(index) <= limit]
+        return [index for index in self.effects if significant(self.log_p(index), alpha)]
 
     @cached_property
     def evidences(self) -> dict[int, float]:
@@ -136,9 +134,9 @@ def at_least(scores: Scores, index: int) -> Array:
     noise, and what noise alone would explain, are taken off its length.
     """
     signature, number, trial = signature_of(scores, index)
-    weighing = scores.weighings[index][number]
-    fall = float(chi_squares(weighing, scores.scores[index][:, :, :1])[trial, 0]) / scores.noise**2
-    beyond = np.sqrt(max(fall - float(weighing.dof[trial]), 0.0)) - 1.0
+    fall, dof = scores.fall(index, number, trial)
+    fall /= scores.noise**2
+    beyond = np.sqrt(max(fall - dof, 0.0)) - 1.0
     return np.asarray(signature * (max(beyond, 0.0) / np.sqrt(max(fall, 1e-300))))
 
 

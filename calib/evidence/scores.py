@@ -21,7 +21,7 @@ from calib.arrays import Array
 from calib.evidence.candidate import Candidate
 from calib.evidence.problem import LinearProblem
 from calib.evidence.tails import log_any, log_tail, looks
-from calib.evidence.weighing import Stack, Weighing, soft_test, stacked
+from calib.evidence.weighing import Stack, Weighing, chi_squares, soft_test, stacked
 from calib.scaled import Scaled
 
 EVEN = 0.9
@@ -156,6 +156,12 @@ class Scores:
                 dof = np.maximum(self.problem.trace - stack.dof.reshape(-1), 1.0)
                 left.append(float(np.min((self.squares[0] - chi2) / dof)))
         return float(np.sqrt(max(1.0, min(left))))
+
+    def fall(self, index: int, number: int, trial: int) -> tuple[float, int]:
+        """Fall of chi-square by a hypothesis in the observation, and its degrees of freedom."""
+        weighing = self.weighings[index][number]
+        seen = chi_squares(weighing, self.scores[index][:, :, :1])[trial, 0]
+        return float(seen), int(weighing.dof[trial])
 
     def of_units(self, index: int, matrix: Array) -> Array:
         """Unit columns of a candidate times a matrix (R, m): (T, k, m)."""

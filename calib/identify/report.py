@@ -26,8 +26,8 @@ def fit_report(fit: Fit) -> dict[str, Any]:
         "effects": [effect.id for effect in fit.model.effects],
         "readings": fit.readings,
         **quality(fit),
-        "holdout_rms_um": _um(held.rms_mm),
-        "holdout_floor_um": _um(held.floor_mm),
+        "holdout_rms_um": um(held.rms_mm),
+        "holdout_floor_um": um(held.floor_mm),
         "parameters": parameter_table(fit),
         "unidentified": unidentified_groups(fit),
         "unidentified_words": unidentified_words(fit),
@@ -43,8 +43,8 @@ def quality(fit: Fit) -> dict[str, float | None]:
     """Chi-square per degree of freedom, RMS and noise floor."""
     return {
         "chi2_per_dof": _finite(fit.chi2_per_dof),
-        "rms_um": _um(fit.rms_mm),
-        "noise_floor_um": _um(fit.noise_floor_mm),
+        "rms_um": um(fit.rms_mm),
+        "noise_floor_um": um(fit.noise_floor_mm),
     }
 
 
@@ -118,7 +118,8 @@ def unidentified_words(fit: Fit) -> list[str]:
     ]
 
 
-def _um(millimetres: float) -> float | None:
+def um(millimetres: float) -> float | None:
+    """Length in micrometres; None where it is not finite, for JSON."""
     return _finite(1000.0 * millimetres)
 
 
