@@ -4,9 +4,10 @@ import pkgutil
 from functools import lru_cache
 from importlib import import_module
 
-from calib.effects.component import Effect, Signature, Situation, Unknown
+from calib.effects.component import Effect, Signature, Situation
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
+from calib.unknown import Unknown
 
 __all__ = [
     "Effect",

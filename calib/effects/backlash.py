@@ -1,15 +1,9 @@
 """Lost motion: extension_i = -b_i/2 times the sign of the leg's last change."""
 
 from calib.arrays import Array
-from calib.effects.component import (
-    Effect,
-    Signature,
-    Situation,
-    Unknown,
-    alone,
-    per_actuator,
-)
+from calib.effects.component import Effect, Signature, Situation, alone, per_actuator
 from calib.runs.stack import Rows
+from calib.unknown import Unknown
 
 
 class Backlash(Effect):

@@ -27,7 +27,7 @@ from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import element_twists
 from calib.mechanism.solve import Configuration
 from calib.runs.stack import Rows
-from calib.unknown import Unknown as Unknown
+from calib.unknown import Unknown
 
 Kind = Literal["machine", "measurement"]
 

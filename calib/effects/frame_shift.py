@@ -9,10 +9,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown
+from calib.effects.component import Effect, Signature, Situation
 from calib.effects.tracker import rigid_motions
 from calib.mechanism.rigid import rotate
 from calib.runs.stack import Rows
+from calib.unknown import Unknown
 
 MOMENTS = 40
 """Most moments that are tried."""

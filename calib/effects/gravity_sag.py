@@ -12,13 +12,14 @@ compliances of the closure are in the file's proportion to them.
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown, alone
+from calib.effects.component import Effect, Signature, Situation, alone
 from calib.mechanism.axes import units_of
 from calib.mechanism.closure import Closure, Standing
 from calib.mechanism.compiled import compile_machine
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import cross, rotate
 from calib.runs.stack import Rows
+from calib.unknown import Unknown
 
 
 def actuator_forces(situation: Situation) -> Array:

@@ -3,10 +3,11 @@
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown, alone
+from calib.effects.component import Effect, Signature, Situation, alone
 from calib.effects.lengthened import Change, lengthened
 from calib.mechanism.description import Machine
 from calib.runs.stack import Rows
+from calib.unknown import Unknown
 
 
 class JointAzimuth(Effect):

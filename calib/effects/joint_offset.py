@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown
+from calib.effects.component import Effect, Signature, Situation
 from calib.effects.legs import Leg, arm_between, leg_of
 from calib.effects.lengthened import Change, lengthened
 from calib.effects.limb_frames import frames_along, limb_labels, place_on_platform
@@ -20,6 +20,7 @@ from calib.mechanism.description import Machine
 from calib.mechanism.rigid import rotate
 from calib.mechanism.traits import UniversalJoint
 from calib.runs.stack import Rows
+from calib.unknown import Unknown
 
 PASSES = 4
 ARMS = {"base": "L_B", "platform": "L_P"}

@@ -3,8 +3,9 @@
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown, alone
+from calib.effects.component import Effect, Signature, Situation, alone
 from calib.runs.stack import Rows
+from calib.unknown import Unknown
 
 SIGMA_MM = 0.05
 

@@ -9,12 +9,13 @@ from functools import lru_cache
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown
+from calib.effects.component import Effect, Signature, Situation
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import Poses, small_rotation
 from calib.mechanism.solve import begun_at, forward
 from calib.mechanism.variants import closure_names, with_closure
 from calib.runs.stack import Rows
+from calib.unknown import Unknown
 
 
 class Redundancy(Effect):

@@ -11,10 +11,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from calib.arrays import Array, IntArray
-from calib.effects.component import Effect, Signature, Situation, Unknown, alone
+from calib.effects.component import Effect, Signature, Situation, alone
 from calib.mechanism.axes import units_of
 from calib.mechanism.description import Machine
 from calib.runs.stack import Rows
+from calib.unknown import Unknown
 
 OVERSAMPLING = 3.0
 """Trial frequencies for each independent one (1 / range of s)."""

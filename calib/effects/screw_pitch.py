@@ -1,15 +1,9 @@
 """Every screw has its own gain: extension_i = g_i s_i."""
 
 from calib.arrays import Array
-from calib.effects.component import (
-    Effect,
-    Signature,
-    Situation,
-    Unknown,
-    alone,
-    per_actuator,
-)
+from calib.effects.component import Effect, Signature, Situation, alone, per_actuator
 from calib.runs.stack import Rows
+from calib.unknown import Unknown
 
 
 class ScrewPitch(Effect):

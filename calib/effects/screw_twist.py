@@ -8,9 +8,10 @@ axis to the platform-side one.
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown
+from calib.effects.component import Effect, Signature, Situation
 from calib.mechanism.description import Limb, Machine, Term
 from calib.runs.stack import Rows
+from calib.unknown import Unknown
 
 
 class ScrewTwist(Effect):

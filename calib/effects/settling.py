@@ -8,8 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown
+from calib.effects.component import Effect, Signature, Situation
 from calib.runs.stack import Rows
+from calib.unknown import Unknown
 
 
 class Settling(Effect):

@@ -7,11 +7,12 @@ above all, stays as the frames say.
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown
+from calib.effects.component import Effect, Signature, Situation
 from calib.effects.lengthened import Change, lengthened
 from calib.effects.limb_frames import nominal_value
 from calib.mechanism.description import Limb, Machine
 from calib.runs.stack import Rows
+from calib.unknown import Unknown
 
 REFERENCE_C = 20.0
 

@@ -3,9 +3,10 @@
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, Unknown
+from calib.effects.component import Effect, Signature, Situation
 from calib.mechanism.rigid import cross
 from calib.runs.stack import Rows
+from calib.unknown import Unknown
 
 
 class TrackerScale(Effect):

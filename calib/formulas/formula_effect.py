@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from calib.arrays import Array, IntArray
-from calib.effects.component import Effect, Kind, Signature, Situation, Unknown
+from calib.effects.component import Effect, Kind, Signature, Situation
 from calib.effects.component import alone as alone_parts
 from calib.formulas.expression import (
     Expression,
@@ -16,6 +16,7 @@ from calib.formulas.expression import (
 )
 from calib.mechanism.axes import units_of
 from calib.runs.stack import Rows
+from calib.unknown import Unknown
 
 USUAL_MM = 0.01
 """Displacement that an effect of unstated size is taken to cause, RMS."""
