@@ -12,6 +12,7 @@ from drivers.emscon.framing import Framer
 from drivers.errors import ConnectFailed, DeviceError, LinkError, LinkLost, Refused, Silence
 
 CHUNK = 65536
+UNREAD_S = 0.05
 
 
 @dataclass
@@ -87,25 +88,32 @@ class EmsconLink:
             pending = self._pending = _Pending(wire.COMMANDS[name].code, many, future)
             try:
                 self._writer.write(wire.request(name, **values))
-                async with asyncio.timeout(timeout):
-                    return await future
-            except TimeoutError as error:
-                # Later answers could no longer be told from answers to later requests.
-                self._break(
-                    Silence(
-                        f"no answer to {name} within {timeout:.1f} s",
-                        device=self.device,
-                        remedy="Check the tracker, then reconnect.",
-                    )
-                )
-                raise (self.lost or error) from error
+                await asyncio.wait({future}, timeout=timeout)
+                if not future.done():
+                    # Where this very process was held up the answer may lie here unread.
+                    await asyncio.wait({future}, timeout=UNREAD_S)
+                if not future.done():
+                    self._fall_silent(name, timeout)
+                return future.result()
             except asyncio.CancelledError:
-                # Its answer will still come, and must not be taken for that of a later request.
-                pending.done = asyncio.get_running_loop().create_future()
-                self._owed.append(pending)
+                if future.done():
+                    future.exception()  # the answer came at that very moment; nobody waits for it
+                else:
+                    # It will still come, and must not be taken for that of a later request.
+                    self._owed.append(pending)
                 raise
             finally:
                 self._pending = None
+
+    def _fall_silent(self, name: str, timeout: float) -> None:
+        """End the link: late answers could not be told from those to later requests."""
+        self._break(
+            Silence(
+                f"no answer to {name} within {timeout:.1f} s",
+                device=self.device,
+                remedy="Check the tracker, then reconnect.",
+            )
+        )
 
     async def _read(self) -> None:
         framer = Framer()

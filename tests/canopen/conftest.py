@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import struct
 import subprocess
 import sys
 import time
@@ -11,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from canopen_bench import set_speed
 
 from drivers.canopen import CanopenController
 from drivers.errors import DeviceError
@@ -31,7 +31,7 @@ class Station:
     def power_cycle(self) -> None:
         """Cut the power and wait until it is back."""
         self.hands("fault", name="power-cycle")
-        deadline = time.monotonic() + 5.0
+        deadline = time.monotonic() + 30.0
         while "power-cycle" in self.hands("faults")["faults"]:
             assert time.monotonic() < deadline
             time.sleep(0.005)
@@ -90,7 +90,7 @@ class Connected:
 
 @pytest.fixture
 async def connected(station: Station) -> AsyncIterator[Connected]:
-    controller = await CanopenController.connect("slcan", station.channel, silence_s=0.8)
+    controller = await CanopenController.connect("slcan", station.channel, silence_s=1.2)
     alarms: list[Alarm] = []
     controller.on_alarm(alarms.append)
     yield Connected(controller, alarms)
@@ -104,13 +104,11 @@ def controller(connected: Connected) -> CanopenController:
 
 @pytest.fixture
 async def slow(enabled: CanopenController) -> CanopenController:
-    """An enabled controller at z = 206, whose moves from there take some wall seconds."""
-    controller = enabled
-    await controller.move_to_pose((0.0, 0.0, 206.0, 0.0, 0.0, 0.0))
-    await controller.wait_arrived(5.0)
-    device = controller._bus.controller
-    await device.call(lambda: device.download(0x2430, 0, struct.pack("<d", 0.25)))  # mm/s
-    return controller
+    """An enabled controller at z = 206, whose moves from there take eight wall seconds."""
+    await enabled.move_to_pose((0.0, 0.0, 206.0, 0.0, 0.0, 0.0))
+    await enabled.wait_arrived(20.0)
+    await set_speed(enabled, 0.05)
+    return enabled
 
 
 @pytest.fixture

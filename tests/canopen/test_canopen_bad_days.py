@@ -2,10 +2,10 @@
 
 import asyncio
 import socket
-import time
 
 import can
 import pytest
+from canopen_bench import FAST_MM_PER_S, set_speed, until
 
 from drivers.canopen import CanopenController
 from drivers.errors import (
@@ -22,23 +22,16 @@ LOW = (0.0, 0.0, 206.0, 0.0, 0.0, 0.0)
 HIGH = (0.0, 0.0, 246.0, 0.0, 0.0, 0.0)
 
 
-async def until(true, timeout: float = 5.0) -> None:
-    deadline = time.monotonic() + timeout
-    while not true():
-        assert time.monotonic() < deadline
-        await asyncio.sleep(0.01)
-
-
 async def go(controller: CanopenController, pose: tuple[float, ...]) -> None:
     await controller.move_to_pose(pose)
-    await controller.wait_arrived(5.0)
+    await controller.wait_arrived(20.0)
 
 
 async def test_drive_fault_in_a_move_stops_all_legs(station, connected, slow):
     await slow.move_to_pose(HIGH)
     station.hands("fault", name="drive-fault:4")
     with pytest.raises(DriveFault, match=r"q4 .*hardware error"):
-        await slow.wait_arrived(5.0)
+        await slow.wait_arrived(20.0)
     await until(lambda: not station.moving)
     assert any(a.fault and "0x5000" in a.what for a in connected.alarms)
     with pytest.raises(DriveFault):
@@ -63,11 +56,12 @@ async def test_jammed_leg_becomes_a_following_error(station, connected, slow):
     await slow.move_to_pose(HIGH)
     station.hands("stall", leg=6)
     with pytest.raises(DriveFault, match=r"q6 .*following error.*0x8611"):
-        await slow.wait_arrived(5.0)
+        await slow.wait_arrived(20.0)
     await until(lambda: not station.moving)
     station.hands("unstall", leg=6)
     await slow.clear_faults()
     await slow.enable()
+    await set_speed(slow, FAST_MM_PER_S)
     await go(slow, HOME)
 
 
@@ -76,7 +70,7 @@ async def test_lost_heartbeat_stops_the_machine(station, connected, slow, node: 
     await slow.move_to_pose(HIGH)
     station.hands("fault", name=f"heartbeat-silent:{node}")
     with pytest.raises(HeartbeatLost, match=f"node {node}"):
-        await slow.wait_arrived(5.0)
+        await slow.wait_arrived(20.0)
     await until(lambda: not station.moving)
     with pytest.raises(HeartbeatLost):
         slow.check()
@@ -92,7 +86,7 @@ async def test_reset_connection_is_a_lost_link_and_the_machine_stops(station, sl
     await slow.move_to_pose(HIGH)
     station.hands("reset-tcp", of="controller")
     with pytest.raises(LinkLost, match="connect again"):
-        await slow.wait_arrived(5.0)
+        await slow.wait_arrived(20.0)
     with pytest.raises(LinkLost, match="emergency stop"):
         await slow.stop()
     await slow.stop()
@@ -105,6 +99,7 @@ async def test_reset_connection_is_a_lost_link_and_the_machine_stops(station, sl
         again.check()
     await again.clear_faults()
     await again.enable()
+    await set_speed(again, FAST_MM_PER_S)
     await go(again, HOME)
     await again.close()
 
@@ -113,7 +108,7 @@ async def test_machine_stops_when_the_pc_says_nothing_more(station, connected, s
     await slow.move_to_pose(HIGH)
     assert station.moving
     slow._bus.link._end.set()  # our heartbeat ends, as if this process hung
-    await until(lambda: not station.moving, 3.0)
+    await until(lambda: not station.moving, 6.0)
     await until(lambda: any("no longer hears" in a.what for a in connected.alarms))
 
 
@@ -131,10 +126,10 @@ async def test_quick_stop_in_the_middle_of_everything(station, slow):
 
     async def work() -> None:
         await slow.move_to_pose(HIGH)
-        await slow.wait_arrived(10.0)
+        await slow.wait_arrived(20.0)
 
     working = [asyncio.ensure_future(work()), asyncio.ensure_future(slow.state())]
-    await asyncio.sleep(0.05)
+    await until(lambda: station.moving)
     await slow.stop()
     assert not station.moving
     with pytest.raises(DeviceFault):
@@ -152,7 +147,7 @@ async def test_jammed_leg_ends_a_jog(station, enabled):
 async def test_stop_ends_a_jog(station, enabled):
     await go(enabled, LOW)
     drive = enabled._bus.controller.link._network[5]
-    await asyncio.to_thread(drive.sdo.download, 0x6081, 0, (250_000).to_bytes(4, "little"))
+    await asyncio.to_thread(drive.sdo.download, 0x6081, 0, (10_000).to_bytes(4, "little"))
     jogging = asyncio.ensure_future(enabled.jog("q5", 240.0))
     await until(lambda: station.moving)
     await enabled.stop()
@@ -206,6 +201,8 @@ async def test_a_second_listener_disturbs_nothing(station, enabled):
     ) as listener:
         assert await asyncio.to_thread(listener.recv, 2.0) is not None
         await go(enabled, LOW)
-        await asyncio.sleep(0.3)
-        heard = {message.arbitration_id for message in iter(lambda: listener.recv(0.01), None)}
-    assert {0x18A, 0x28A, 0x20A, 0x70A, 0x701} <= heard
+        missing = {0x18A, 0x28A, 0x20A, 0x70A, 0x701}
+        while missing:
+            message = await asyncio.to_thread(listener.recv, 10.0)
+            assert message is not None, missing
+            missing.discard(message.arbitration_id)

@@ -64,7 +64,7 @@ async def test_lost_frame_costs_time_and_nothing_else(middleman: Middleman, lost
     middleman.loses = lambda line: line.startswith(lost)
     targets = await controller.move_to_pose(HOME)
     assert targets == pytest.approx([230.7148097226] * 6, abs=1e-9)
-    await controller.wait_arrived(5.0)
+    await controller.wait_arrived(20.0)
     middleman.loses = lambda line: False
     await controller.close()
 
@@ -75,7 +75,7 @@ async def test_silent_adapter_is_noticed_by_the_heartbeats(station, middleman: M
     noticed = asyncio.Event()
     controller.on_alarm(lambda alarm: noticed.set())
     middleman.loses = lambda line: True
-    await asyncio.wait_for(noticed.wait(), 3.0)
+    await asyncio.wait_for(noticed.wait(), 20.0)
     with pytest.raises(HeartbeatLost):
         controller.check()
     await controller.close()

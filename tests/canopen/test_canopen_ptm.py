@@ -89,7 +89,7 @@ async def test_drives_point_where_the_controller_s_parameters_say(
 ) -> None:
     pose = (radians(35.0), radians(110.0))
     targets = await drive.move_to_pose(pose)
-    await drive.wait_arrived(10.0)
+    await drive.wait_arrived(30.0)
     assert targets == pytest.approx(BODY.commanded({}, np.array([pose]))[0], abs=1e-12)
     with ControlClient(lab.announcement["control"]) as hands:
         truth = hands("truth", settled=True)

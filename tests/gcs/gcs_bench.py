@@ -57,10 +57,10 @@ class Bench:
         return self.controller
 
     async def slow_move(self) -> None:
-        """Start a move that takes some wall seconds."""
+        """Start a move that takes several wall seconds."""
         controller = self.driver
         await controller.enable()
-        await controller._link.call(lambda line: line.command("VEL A 0.1 B 0.1 C 0.1"))
+        await controller._link.call(lambda line: line.command("VEL A 0.03 B 0.03 C 0.03"))
         await controller.move_to_pose(LOW)
         await until(lambda: self.world.moving)
 
@@ -70,7 +70,7 @@ def tcp_port(station: GcsStation) -> str:
     return f"socket://{host}:{port}"
 
 
-async def until(true, timeout: float = 5.0) -> None:
+async def until(true, timeout: float = 20.0) -> None:
     deadline = time.monotonic() + timeout
     while not true():
         assert time.monotonic() < deadline

@@ -13,7 +13,7 @@ from drivers.gcs import GcsController
 
 async def go(controller: GcsController, pose: tuple[float, ...]) -> tuple[float, ...]:
     q = await controller.move_to_pose(pose)
-    await controller.wait_arrived(5.0)
+    await controller.wait_arrived(20.0)
     return q
 
 
@@ -51,7 +51,7 @@ async def test_jog_moves_one_slider(bench: Bench, controller: GcsController):
 async def test_move_to_q(bench: Bench, controller: GcsController):
     await controller.enable()
     await controller.move_to_q((400.0, 405.0, 410.0))
-    await controller.wait_arrived(5.0)
+    await controller.wait_arrived(20.0)
     assert [leg.position() for leg in bench.world.legs] == pytest.approx([-10.0, -5.0, 0.0])
 
 
@@ -108,7 +108,7 @@ async def test_stop_during_a_move(bench: Bench, controller: GcsController):
 
 async def test_stop_overtakes_commands_that_wait(bench: Bench, controller: GcsController):
     await controller.enable()
-    held = asyncio.create_task(controller._link.call(lambda line: time.sleep(0.3)))
+    held = asyncio.create_task(controller._link.call(lambda line: time.sleep(1.0)))
     moving = asyncio.create_task(controller.move_to_pose(LOW))
     await asyncio.sleep(0.05)
     stopping = asyncio.create_task(controller.stop())
@@ -125,7 +125,7 @@ async def test_somebody_else_stops_the_machine(bench: Bench, controller: GcsCont
     with bench.station._lock:
         bench.station.controller.stop()
     with pytest.raises(DeviceFault, match="stopped"):
-        await controller.wait_arrived(5.0)
+        await controller.wait_arrived(20.0)
 
 
 async def test_channels(controller: GcsController):

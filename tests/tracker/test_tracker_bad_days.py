@@ -1,12 +1,14 @@
 """The driver against the mock tracker: beams break, links break, answers stay away."""
 
 import asyncio
+import time
 
 import numpy as np
 import pytest
-from tracker_bench import SCALE, Bench
+from tracker_bench import SCALE, Bench, tracker_in_a_thread, until
 
 from drivers.emscon import EmsconTracker, wire
+from drivers.emscon.link import EmsconLink
 from drivers.errors import (
     BeamBroken,
     DeviceError,
@@ -32,10 +34,9 @@ async def test_beam_comes_back_by_itself_and_the_next_dwell_is_good(locked: Benc
     locked.server.instrument.measuring.break_next = (0.5, 1.0)
     with pytest.raises(BeamBroken):
         await locked.tracker.measure(4.0)
-    for _ in range(400):
-        if (await locked.tracker.state()).locked:
-            break
-        await asyncio.sleep(0.005)
+    async with asyncio.timeout(20.0):
+        while not (await locked.tracker.state()).locked:  # noqa: ASYNC110
+            await asyncio.sleep(0.005)
     reading = await locked.tracker.measure(1.0)
     assert np.linalg.norm(np.array(reading.xyz) - locked.nest("3")) < 0.05
 
@@ -56,8 +57,7 @@ async def test_beam_broken_in_the_stream(locked: Bench) -> None:
 
 async def test_beam_loss_between_measurements_is_an_alarm(locked: Bench) -> None:
     locked.server.instrument.break_beam()
-    await asyncio.sleep(0.05)
-    assert any("beam is broken" in alarm.what for alarm in locked.alarms)
+    await until(lambda: any("beam is broken" in alarm.what for alarm in locked.alarms))
     locked.tracker.check()
 
 
@@ -95,8 +95,7 @@ async def test_unsolicited_error_is_no_answer_to_a_command(locked: Bench) -> Non
 
 
 async def test_unsolicited_error_in_a_dwell_is_loss_of_lock(locked: Bench) -> None:
-    dwell = asyncio.create_task(locked.tracker.measure(100.0))
-    await asyncio.sleep(2.0 / SCALE)
+    dwell = await locked.in_dwell()
     locked.server.instrument.unsolicited(12345)
     with pytest.raises(BeamBroken, match="not published"):
         await dwell
@@ -104,34 +103,30 @@ async def test_unsolicited_error_in_a_dwell_is_loss_of_lock(locked: Bench) -> No
 
 
 async def test_smr_carried_away_in_a_dwell(locked: Bench) -> None:
-    dwell = asyncio.create_task(locked.tracker.measure(100.0))
-    await asyncio.sleep(2.0 / SCALE)
+    dwell = await locked.in_dwell()
     locked.server.instrument.drop_smr()
     with pytest.raises(BeamBroken):
         await dwell
 
 
 async def test_platform_moving_in_a_dwell_is_no_stationary_result(locked: Bench) -> None:
-    dwell = asyncio.create_task(locked.tracker.measure(40.0))
-    await asyncio.sleep(0.005)
+    dwell = await locked.in_dwell(100.0)
     locked.world.legs[0].command(8.0, 1.0)
     with pytest.raises(MeasurementError, match="did not stand still"):
         await dwell
 
 
 async def test_stop_ends_a_dwell_at_once(locked: Bench) -> None:
-    dwell = asyncio.create_task(locked.tracker.measure(100.0))
-    await asyncio.sleep(0.02)
+    dwell = await locked.in_dwell()
     await locked.tracker.stop()
     await locked.tracker.stop()
     with pytest.raises(BeamBroken, match="stopped"):
-        await asyncio.wait_for(dwell, 0.4)
+        await asyncio.wait_for(dwell, 20.0)
     await locked.tracker.measure(0.5)
 
 
 async def test_cancelled_dwell_leaves_no_result_behind(locked: Bench) -> None:
-    dwell = asyncio.create_task(locked.tracker.measure(100.0))
-    await asyncio.sleep(0.005)
+    dwell = await locked.in_dwell()
     dwell.cancel()
     with pytest.raises(asyncio.CancelledError):
         await dwell
@@ -152,6 +147,38 @@ async def test_cancelled_command_does_not_answer_the_next_one(locked: Bench) -> 
     assert np.linalg.norm(np.array(reading.xyz) - locked.nest("4")) < 0.05
 
 
+@pytest.mark.parametrize("just", ["before it is read", "before it is taken"])
+async def test_a_command_cancelled_as_its_answer_comes_is_owed_nothing(
+    bench: Bench, just: str
+) -> None:
+    """The answer is swallowed with the command: the next one of its kind has one of its own."""
+    link, loop = bench.tracker._link, asyncio.get_running_loop()
+    asking = asyncio.create_task(link.ask("GetFace", 1.0))
+
+    def cancel(packet: wire.Packet) -> None:
+        if just == "before it is read":
+            asking.cancel()
+        else:
+            loop.call_soon(asking.cancel)
+
+    link.listen(cancel, lambda error: None)
+    with pytest.raises(asyncio.CancelledError):
+        await asking
+    link.listen(lambda packet: None, lambda error: None)
+    assert (await link.ask("GetFace", 1.0)).integer("face") in (0, 1)
+
+
+async def test_an_answer_that_lies_unread_because_we_were_held_up_counts() -> None:
+    with tracker_in_a_thread() as address:
+        host, _, port = address.rpartition(":")
+        link = await EmsconLink.open(host, int(port))
+        asking = asyncio.create_task(link.ask("GetFace", 0.1))
+        await asyncio.sleep(0.0)  # the request is on its way
+        time.sleep(0.5)  # noqa: ASYNC251 - nothing of this process runs meanwhile
+        assert (await asking).integer("face") in (0, 1)
+        await link.close()
+
+
 async def test_stop_while_the_beam_turns_does_not_wait_for_it(locked: Bench) -> None:
     turning = asyncio.create_task(locked.tracker.point_at(locked.nest("b3")))
     await asyncio.sleep(0)
@@ -161,11 +188,10 @@ async def test_stop_while_the_beam_turns_does_not_wait_for_it(locked: Bench) -> 
 
 
 async def test_link_reset_in_a_dwell(locked: Bench) -> None:
-    dwell = asyncio.create_task(locked.tracker.measure(100.0))
-    await asyncio.sleep(0.02)
+    dwell = await locked.in_dwell()
     locked.server.reset_connection()
     with pytest.raises(LinkLost, match="reconnect"):
-        await asyncio.wait_for(dwell, 1.0)
+        await asyncio.wait_for(dwell, 20.0)
     with pytest.raises(LinkLost):
         locked.tracker.check()
     assert any(alarm.fault for alarm in locked.alarms)
@@ -285,7 +311,7 @@ async def test_nonsense_from_a_client_does_not_end_the_mock(bench: Bench) -> Non
         reader, writer = await asyncio.open_connection(host, int(port))
         noise = rng.integers(0, 256, 64, dtype=np.uint8).tobytes()
         writer.write(wire.request("GetFace")[:-2] + noise)
-        await asyncio.wait_for(reader.read(1000), 2.0)
+        await asyncio.wait_for(reader.read(1000), 20.0)
         writer.close()
     tracker = await EmsconTracker.connect(bench.server.address, time_scale=SCALE)
     await tracker.close()
