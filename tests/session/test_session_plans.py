@@ -1,5 +1,6 @@
 """Plans: stable numbered steps, readable back, and a path that is checked as a whole."""
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from app.session.path import check_waypoints, waypoints
 from app.session.plan import Plan
 from app.session.plans import Order, PlanOptions, measure_plan
 from calib.errors import BadInput
+from calib.mechanism.description import Machine
 
 
 @pytest.fixture
@@ -69,15 +71,44 @@ def test_waypoints_are_the_poses_in_order_without_standing_still(site: Site) -> 
     assert all(a != b for a, b in pairwise(path))
 
 
-def test_a_way_between_two_good_poses_that_leaves_the_strokes_is_refused(site: Site) -> None:
+def test_a_pose_beyond_the_strokes_is_refused(site: Site) -> None:
     machine = site.machine
-    # Both ends turn the platform as far as the legs reach, in opposite directions and heights.
-    poses = [machine.home, (0.0, 0.0, 205.0, 0.0, 0.0, 0.30), (0.0, 0.0, 235.0, 0.0, 0.0, -0.30)]
-    least = check_waypoints(machine, {}, poses[:2], ["home", "low"])
+    poses = [machine.home, (0.0, 0.0, 205.0, 0.0, 0.0, 0.30)]
+    least = check_waypoints(machine, {}, poses, ["home", "low"])
     assert least > 0.0
     with pytest.raises(GateRefused) as refused:
-        check_waypoints(machine, {}, [*poses[:2], (0.0, 0.0, 290.0, 0.0, 0.0, 0.0)], list("hlx"))
+        check_waypoints(machine, {}, [*poses, (0.0, 0.0, 290.0, 0.0, 0.0, 0.0)], list("hlx"))
+    assert "pose x" in refused.value.what
     assert "q" in refused.value.what
+    assert "nothing has moved" in refused.value.remedy
+
+
+def guarded(machine: Machine, limb: str, joint: str, low: float) -> Machine:
+    """The same machine, one passive joint of which must not turn below ``low``, rad."""
+    limbs = [
+        replace(
+            each,
+            joints=tuple(
+                replace(j, limits=(low, np.inf)) if (each.name, j.name) == (limb, joint) else j
+                for j in each.joints
+            ),
+        )
+        for each in machine.limbs
+    ]
+    return replace(machine, limbs=tuple(limbs))
+
+
+def test_a_way_between_two_good_poses_that_passes_a_joints_limit_is_refused(site: Site) -> None:
+    """Turned the other way round and back, the platform bends this joint least on the way."""
+    there, back = (0.0, 0.0, 215.0, 0.0, 0.2, 0.2), (0.0, 0.0, 215.0, 0.0, -0.2, -0.2)
+    at_the_ends, on_the_way = 0.3538, 0.3258
+    low = 0.5 * (at_the_ends + on_the_way)
+    machine = guarded(site.machine, "leg3", "swing_B", low)
+    for pose in (there, back):
+        assert check_waypoints(machine, {}, [pose], ["alone"]) > 0.0
+    assert check_waypoints(site.machine, {}, [there, back], ["a", "b"]) > 0.0
+    with pytest.raises(GateRefused, match=r"way from pose a to pose b .*leg3\.swing_B") as refused:
+        check_waypoints(machine, {}, [there, back], ["a", "b"])
     assert "nothing has moved" in refused.value.remedy
 
 

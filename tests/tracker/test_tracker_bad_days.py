@@ -110,10 +110,9 @@ async def test_smr_carried_away_in_a_dwell(locked: Bench) -> None:
 
 
 async def test_platform_moving_in_a_dwell_is_no_stationary_result(locked: Bench) -> None:
-    dwell = await locked.in_dwell(100.0)
-    locked.world.legs[0].command(8.0, 1.0)
+    locked.world.legs[0].command(8.0, 30.0)
     with pytest.raises(MeasurementError, match="did not stand still"):
-        await dwell
+        await locked.tracker.measure(20.0)
 
 
 async def test_stop_ends_a_dwell_at_once(locked: Bench) -> None:
