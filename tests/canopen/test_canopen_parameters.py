@@ -9,6 +9,8 @@ import pytest
 
 from drivers.canopen import CanopenController
 from drivers.canopen import layout as at
+from drivers.canopen.link import Device
+from drivers.canopen.parameter_access import ParameterAccess
 from drivers.errors import ParameterError, Refused
 from mocks.physics.truth import machine_file
 
@@ -28,6 +30,33 @@ async def test_what_is_written_is_read_back_bit_for_bit(controller: CanopenContr
     await controller.write_parameters(values)
     held = await controller.read_parameters()
     assert all(struct.pack("<d", held[n]) == struct.pack("<d", v) for n, v in values.items())
+
+
+class WithASecondWriter:
+    """The controller node, to which somebody else writes as soon as one block was read."""
+
+    def __init__(self, device: Device, address: tuple[int, int], value: float) -> None:
+        self.label = device.label
+        self._device, self._address, self._value = device, address, value
+
+    def upload(self, index: int, sub: int = 0) -> bytes:
+        data = self._device.upload(index, sub)
+        if index == at.KINEMATIC_BLOCK:
+            self._device.download(*self._address, struct.pack("<d", self._value))
+        return data
+
+
+@pytest.mark.parametrize("name", ["leg2.B_x", "backlash.leg3"])
+async def test_a_set_that_changes_between_its_blocks_is_refused(
+    controller: CanopenController, name: str
+):
+    """The blocks are of two sets then: each carries the checksum of its own."""
+    device, layout = controller._bus.controller, controller.layout
+    value = (await controller.read_parameters())[name]
+    meddled = WithASecondWriter(device, layout.parameters[name], value + 0.25)
+    with pytest.raises(ParameterError, match="checksum"):
+        await device.call(ParameterAccess(meddled, layout).read)
+    assert (await controller.read_parameters())[name] == value + 0.25
 
 
 async def test_checksum_is_the_crc32_of_all_values_in_order(controller: CanopenController):

@@ -4,6 +4,7 @@ import sqlite3
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from session_mock import POSES, Heard, Mock
 
@@ -13,6 +14,7 @@ from app.session import events as ev
 from app.session.plans import Order
 from calib.identify import fit
 from calib.model import Model
+from calib.runs import Run
 from calib.runs.stack import stack
 
 OPTIONS = PlanOptions(reference_every=3, warm_up=False)
@@ -38,6 +40,35 @@ def watch_the_journal(session: Session) -> None:
     session.observers.watch(hear)
 
 
+def arrivals(session: Session) -> list[tuple[float, float]]:
+    """For each move machine times between which it arrived: its command, and when it was told."""
+    times: list[tuple[float, float]] = []
+    commanded = [0.0]
+
+    def hear(event: ev.Event) -> None:
+        if isinstance(event, ev.PoseCommanded):
+            commanded.append(event.time_s)
+        if isinstance(event, ev.LivePose) and not event.moving and event.q == event.target:
+            times.append((commanded[-1], session.station.clock.now()))
+
+    session.observers.watch(hear)
+    return times
+
+
+def delays_are_from_arrival_to_dwell(
+    run: Run, session: Session, arrived: list[tuple[float, float]]
+) -> None:
+    """A delay leads from the begin of the dwell back to the arrival, over the settling."""
+    window = session.station.site.limits.settle_window_s
+    rounding = 2e-3
+    for time_s, delay_s, pose in zip(run.time_s, run.channels["delay_s"], run.pose, strict=True):
+        if not pose or np.isnan(delay_s):
+            continue
+        sent, told = max(pair for pair in arrived if pair[0] <= time_s)
+        assert delay_s >= window - rounding
+        assert sent - rounding <= time_s - delay_s <= told + rounding
+
+
 @pytest.mark.parametrize(
     ("order", "smrs", "moves"), [("nest-by-nest", "1", 18), ("pose-by-pose", "3", 6)]
 )
@@ -56,6 +87,7 @@ async def test_a_campaign_leaves_a_run_that_loads_and_fits(
     )
     session.observers.watch(heard)
     watch_the_journal(session)
+    arrived = arrivals(session)
     try:
         outcome = await session.run()
     finally:
@@ -68,6 +100,7 @@ async def test_a_campaign_leaves_a_run_that_loads_and_fits(
     found = fit(Model(stack(loaded.machine, [loaded.run]), []))
     assert found.readings == outcome.readings == sum(bool(nest) for nest in loaded.run.nest)
     assert 0.4 < found.chi2_per_dof < 2.5
+    delays_are_from_arrival_to_dwell(loaded.run, session, arrived)
 
 
 async def test_base_nests_without_their_own_smrs_are_visited_with_the_one(

@@ -64,6 +64,20 @@ def test_parameters_that_leave_the_workspace_are_refused() -> None:
     assert "workspace" in failed(made(**far), Gates.with_limits({"tolerance": 1e3}))
 
 
+@pytest.mark.parametrize(("scale", "worse"), [(0.8, 1.255), (1.1, 0.908)])
+def test_only_parameters_that_are_nearer_to_a_singularity_are_refused_for_it(
+    scale: float, worse: float
+) -> None:
+    """A smaller circle of joints on the platform holds it less well, a larger one better."""
+    places = [f"leg{i}.P_{axis}" for i in range(1, 7) for axis in "xy"]
+    fit = made(**{name.replace(".", "__"): scale * NOMINAL[name] for name in places})
+    gates = Gates.with_limits({"condition": 1.2, "tolerance": 1e6, "gain": 1e6})
+    checked = gates_of_proposal(gates, MACHINE, fit, propose(MACHINE, fit, HELD), HELD)
+    condition = next(gate for gate in checked if gate.gate == "condition")
+    assert condition.value == pytest.approx(worse, abs=2e-3)
+    assert condition.passed is (worse < 1.2)
+
+
 def test_a_limit_can_be_changed_knowingly_but_not_mistyped() -> None:
     fit = replace(made(), quality={**made().quality, "chi2_per_dof": 9.0})
     assert failed(fit, Gates.with_limits({"chi2": 10.0})) == []
@@ -124,6 +138,26 @@ def test_a_fit_of_another_machine_or_of_53_parameters_is_refused() -> None:
     less = {n: e for n, e in fit.estimates.items() if n != "leg6.L_P"}
     with pytest.raises(BadInput, match=r"leg6\.L_P"):
         propose(MACHINE, replace(fit, estimates=less), HELD)
+
+
+@pytest.mark.parametrize(
+    ("peak", "noise", "beyond", "passed"),
+    [
+        (65.0, 9.0, 56.0, True),
+        (65.0, 0.0, 65.0, False),
+        (75.0, 9.0, 66.0, False),
+        (5.0, 9.0, 0.0, True),
+    ],
+)
+def test_check_peak_counts_what_is_beyond_the_trackers_noise(
+    peak: float, noise: float, beyond: float, passed: bool
+) -> None:
+    before, after = (
+        Summary(400.0, 10.0, 300.0, 0.1, 0.01, 0.05),
+        Summary(peak, 2.0, 6.0, 0.0, 0.0, 0.0),
+    )
+    gate = gates_of_check(GATES, before, after, noise)[0]
+    assert (gate.gate, gate.value, gate.passed) == ("check-peak", beyond, passed)
 
 
 def test_check_poses_must_be_good_and_better() -> None:

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Callable
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from calib.poses import verification_poses
 from calib.runs.stack import stack
 from calib.unknown import Estimate, Unknown
 from drivers.errors import DeviceError, ParameterError
+from drivers.interface import MotionController
 
 # Three check poses are enough here.
 CHECK = {label: POSES[label] for label in "bdf"}
@@ -219,6 +221,39 @@ async def test_what_the_controller_holds_can_be_accepted_knowingly(
     finally:
         await station.close()
     assert held.values["leg2.B_x"] == -46.5
+
+
+class WithASecondWriter:
+    """The connected controller, to which somebody else writes right after its values were read."""
+
+    def __init__(self, controller: MotionController, name: str) -> None:
+        self._controller, self._name = controller, name
+
+    async def parameter_checksum(self) -> int:
+        return await self._controller.parameter_checksum()
+
+    async def read_parameters(self) -> dict[str, float]:
+        values = await self._controller.read_parameters()
+        await self._controller.write_parameters({self._name: values[self._name] + 0.25})
+        return values
+
+
+@pytest.mark.parametrize("name", ["leg2.B_x", "backlash.leg1"])
+async def test_parameters_that_change_while_they_are_read_are_no_set(
+    mock_of: Callable[..., Mock], tmp_path: Path, name: str
+) -> None:
+    """Each value was right when it was read, the set is not: the checksum tells."""
+    station = Station(mock_of("--smrs", "3", scale=600).site)
+    await station.connect()
+    try:
+        await station.controller.disable()
+        meddled = cast(MotionController, WithASecondWriter(station.controller, name))
+        with pytest.raises(ParameterError, match="changed while they were read"):
+            await read_held(station.site, meddled)
+        held = await read_held(station.site, station.controller)
+        assert held.checksum == await station.controller.parameter_checksum()
+    finally:
+        await station.close()
 
 
 async def test_a_stop_during_the_check_poses_puts_everything_back(
