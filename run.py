@@ -4,6 +4,7 @@
     python3 run.py test          the tests (further arguments go to pytest)
     python3 run.py check         formatting, lint, types and layering
     python3 run.py bench [NAME]  the benchmarks, as ratios
+    python3 run.py docs          the documentation as a site, in site/index.html
     python3 run.py docs --check  the commands that the documentation shows, and their output
     python3 run.py pkmcal ...    any verb of the program
 
@@ -82,6 +83,9 @@ def main(arguments: list[str]) -> int:
     if job == "docs" and rest[:1] == ["--check"]:
         ensure_environment("dev")
         return run("python", str(ROOT / "docs" / "check_commands.py"), *rest[1:])
+    if job == "docs":
+        ensure_environment("docs")
+        return run("python", str(ROOT / "docs" / "build_site.py"))
     if job == "bench":
         ensure_environment("bench")
         return run("python", "-m", "bench", *rest)
