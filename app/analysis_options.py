@@ -1,15 +1,38 @@
-"""What the verbs that analyse a machine have in common: which machine, which closure."""
+"""Options that analysing verbs share: which machine, which effects in the model, who watches."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
+from app import answer
 from app.files.machines import load_machine
 from calib.mechanism.description import Machine
 from calib.mechanism.variants import with_closure
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def model_options(function: _Function) -> _Function:
+    """Give a verb ``--add EFFECT`` (repeatable) and ``--model FILE``."""
+    function = click.option(
+        "--model",
+        type=click.Path(path_type=Path),
+        help="Begin with the effects of a saved model file.",
+    )(function)
+    return click.option(
+        "--add", multiple=True, metavar="EFFECT", help="Put an effect in the model (repeatable)."
+    )(function)
+
+
+def watcher() -> Callable[[tuple[str, ...]], None] | None:
+    """Tells every model that is looked at on standard error, on a terminal."""
+    return _tell if answer.interactive() else None
+
+
+def _tell(names: tuple[str, ...]) -> None:
+    answer.say(f"looking at baseline{''.join(' + ' + name for name in names)} ...")
 
 
 def machine_options(function: _Function) -> _Function:

@@ -1,7 +1,6 @@
 """How a verb answers: data on standard output, talk on standard error."""
 
 import json
-import math
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -10,6 +9,8 @@ from typing import Any, TypeVar
 import click
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from app.plain_data import plain
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -31,7 +32,7 @@ def show(data: Mapping[str, Any], as_json: bool, text: str) -> None:
 
 def print_json(data: Mapping[str, Any]) -> None:
     """Print one JSON object; numbers that are not finite become null, as JSON has no others."""
-    click.echo(json.dumps(_finite(data), ensure_ascii=False))
+    click.echo(json.dumps(plain(data), ensure_ascii=False))
 
 
 def say(text: str) -> None:
@@ -66,18 +67,3 @@ def working(text: str) -> Iterator[None]:
 def interactive() -> bool:
     """Whether a person is there to answer a question."""
     return sys.stdin.isatty() and sys.stderr.isatty()
-
-
-def _finite(value: Any) -> Any:
-    """Replace what JSON cannot say, all the way down; numpy numbers and arrays become plain."""
-    if isinstance(value, Mapping):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, str) or value is None or isinstance(value, bool):
-        return value
-    if hasattr(value, "tolist"):
-        return _finite(value.tolist())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Iterable):
-        return [_finite(item) for item in value]
-    return value

@@ -7,17 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 
 from app import answer
-from app.analysis import load_refitter, model_options
+from app.analysis_options import model_options, watcher
 from app.files.runs import outside_runs
-from app.show.compare_charts import write_charts
-from calib.discover.compare import compare_fit
-from calib.discover.compare_report import compare_report
-from calib.discover.discovery import SEED
-from calib.discover.terms import ProposedTerm
-from calib.discover.terms import propose as propose_terms
+from app.jobs.comparing import compare
 
 SHOWN = 6
 WIDTH = 13
@@ -53,43 +47,16 @@ def command(
     with --propose, which --add takes.
     """
     outside_runs(out, runs)
-    outside_runs(propose, runs)
-    refit, begin = load_refitter(runs, add, model)
-    fitted = refit.fit(begin)
-    found = compare_fit(fitted, np.random.default_rng(SEED))
-    if out is not None:
-        for path in write_charts(found, out):
-            answer.say(f"drawn {path}")
-    report = compare_report(found)
     if propose is not None:
-        answer.say("looking for terms ...")
-        terms = propose_terms(fitted, np.random.default_rng(SEED))
-        report["proposed"] = _proposed(terms, propose)
+        answer.say("looking for terms, too ...")
+    found = compare(runs, add=add, model=model, propose=propose, watch=watcher())
+    for path in [] if out is None else found.draw(out):
+        answer.say(f"drawn {path}")
+    for term in found.proposed:
+        if term.file is not None:
+            answer.say(f"written {term.file}")
+    report = found.to_json()
     answer.show(report, as_json, words(report))
-
-
-def _proposed(terms: list[ProposedTerm], path: Path) -> list[dict[str, Any]]:
-    """Write every stable term: FILE, FILE-2 ...; what was found, stable or not, as plain data."""
-    listed = []
-    stable = 0
-    for term in terms:
-        file = None
-        if term.selected.stable:
-            stable += 1
-            name = path.name if stable == 1 else f"{path.stem}-{stable}{path.suffix}"
-            file = path.with_name(name)
-            file.write_text(term.text, encoding="utf-8")
-            answer.say(f"written {file}")
-        listed.append(
-            {
-                "formula": term.formula,
-                "explains_um": 1000.0 * term.explains_mm,
-                "log_evidence": term.selected.log_evidence,
-                "stability": term.selected.frequency,
-                "file": None if file is None else str(file),
-            }
-        )
-    return listed
 
 
 def words(report: dict[str, Any]) -> str:

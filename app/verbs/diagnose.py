@@ -9,8 +9,8 @@ from typing import Any
 import click
 
 from app import answer
-from app.analysis import load_refitter, model_options
-from calib.discover.report import diagnosis_report
+from app.analysis_options import model_options, watcher
+from app.jobs.discovering import diagnose
 
 
 @click.command()
@@ -23,9 +23,8 @@ def command(runs: tuple[str, ...], add: tuple[str, ...], model: Path | None, as_
     The answer says which effect is missing, how sure that is, how large it is and what adding it
     would bring; or that nothing is missing; or that something unknown is.
     """
-    refit, begin = load_refitter(runs, add, model)
     with answer.working("testing every known effect"):
-        report = diagnosis_report(refit(begin).run)
+        report = diagnose(runs, add=add, model=model, watch=watcher()).to_json()
     answer.show(report, as_json, words(report))
 
 

@@ -9,12 +9,10 @@ from typing import Any
 import click
 
 from app import answer
-from app.analysis import load_refitter, model_options
-from app.files.models import write_model
+from app.analysis_options import model_options, watcher
 from app.files.runs import outside_runs
+from app.jobs.discovering import discover
 from app.verbs.diagnose import bad_lines, sizes, um
-from calib.discover.discovery import discover_run, stage_of
-from calib.discover.report import discovery_report
 
 
 @click.command()
@@ -36,13 +34,12 @@ def command(
     An effect is accepted only if poses that the fit has not seen are predicted no worse with it.
     """
     outside_runs(save, runs)
-    refit, begin = load_refitter(runs, add, model)
     with answer.working("looking for effects, adding the best, fitting again"):
-        found = discover_run(refit, begin)
-    report = discovery_report(found)
+        found = discover(runs, add=add, model=model, watch=watcher())
     if save is not None:
-        write_model(save, stage_of(found).run.fit)
+        found.save(save)
         answer.say(f"model written to {save}")
+    report = found.to_json()
     answer.show(report, as_json, words(report))
 
 

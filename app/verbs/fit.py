@@ -9,12 +9,9 @@ from typing import Any
 import click
 
 from app import answer
-from app.analysis import load_rows, model_options
-from app.files.models import write_model
+from app.analysis_options import model_options
 from app.files.runs import outside_runs
-from calib.discover.agreement import runs_at_odds
-from calib.identify import fit_report
-from calib.identify.staged import fit_effects
+from app.jobs.fitting import fit
 
 
 @click.command()
@@ -37,13 +34,11 @@ def command(
     place of the tracker. Nothing is written but the file named with --save.
     """
     outside_runs(save, runs)
-    rows, effects = load_rows(runs, add, model)
-    found = fit_effects(rows, effects)
-    odds = runs_at_odds(found)
-    report = {**fit_report(found), "remarks": [f"{odds}."] if odds else []}
+    found = fit(runs, add=add, model=model)
     if save is not None:
-        write_model(save, found)
+        found.save(save)
         answer.say(f"model written to {save}")
+    report = found.to_json()
     answer.show(report, as_json, words(report))
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from app import answer
-from app.analysis import model_options
+from app.analysis_options import model_options
 from app.files.runs import outside_runs
 from app.report.build import write_report
 

@@ -1,0 +1,188 @@
+"""Ask what the model misses: once (diagnose), or until nothing is missing (discover)."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from app.analysis import load_refitter
+from app.jobs.chosen_runs import File, Runs, names_of, path_of
+from app.jobs.fitting import BadReading, keep_model
+from app.jobs.record import Record, Report
+from calib.discover.discovery import discover_run, stage_of
+from calib.discover.report import diagnosis_report, discovery_report
+from calib.evidence.forward import Discovery
+
+Watch = Callable[[tuple[str, ...]], None]
+"""Told the effects of each model that is looked at."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Size(Record):
+    """An effect's parameter: mm, rad, K, N or what ``unit`` says; sigma 1 standard deviation."""
+
+    name: str
+    value: float
+    sigma: float
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Baseline(Record):
+    """The model that is asked, and how well it does; errors as in :class:`FitReport`."""
+
+    effects: tuple[str, ...]
+    chi2_per_dof: float | None
+    rms_um: float | None
+    noise_floor_um: float | None
+    holdout_rms_um: float | None
+    holdout_floor_um: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class CandidateEffect(Record):
+    """An effect that may be missing.
+
+    ``p_value`` pays for having looked at all of them; ``visible`` is the part of its signature
+    that no other unknown can take over, 0 to 1.
+    """
+
+    effect: str
+    p_value: float
+    rms_after_um: float | None
+    holdout_rms_after_um: float | None
+    visible: float
+    parameters: tuple[Size, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unexplained(Record):
+    """What no known effect explains, and on which columns it depends, strongest first."""
+
+    significant: bool
+    channels: tuple[str, ...]
+    periods: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiagnosisReport(Report):
+    """What is missing from a model (``pkm-diagnosis/1``); the best candidate first."""
+
+    FORMAT: ClassVar[str] = "pkm-diagnosis/1"
+    baseline: Baseline
+    adequate: bool
+    candidates: tuple[CandidateEffect, ...]
+    indistinguishable: tuple[tuple[str, ...], ...]
+    unexplained: Unexplained
+    bad_readings: tuple[BadReading, ...]
+    unavailable: Mapping[str, str]
+    advice: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stair(Record):
+    """A model on the way; None as ``added`` is the one to begin with."""
+
+    added: str | None
+    removed: str | None = None
+    chi2_per_dof: float | None
+    rms_um: float | None
+    noise_floor_um: float | None
+    holdout_rms_um: float | None
+    holdout_floor_um: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiscoveryReport(Report):
+    """What was found step by step (``pkm-discovery/1``); errors as in :class:`FitReport`."""
+
+    FORMAT: ClassVar[str] = "pkm-discovery/1"
+    steps: tuple[Stair, ...]
+    effects: tuple[str, ...]
+    adequate: bool
+    indistinguishable: tuple[tuple[str, ...], ...]
+    unexplained: Unexplained
+    bad_readings: tuple[BadReading, ...]
+    parameters: tuple[Size, ...]
+    refused: tuple[str, ...]
+    advice: str
+    _found: Discovery = field(repr=False, compare=False)
+    _runs: tuple[str, ...] = field(repr=False, compare=False)
+
+    def save(self, file: File) -> None:
+        """Write a model file with what was found, as :meth:`FitReport.save`."""
+        keep_model(file, stage_of(self._found).run.fit, self._runs)
+
+
+def diagnose(
+    runs: Runs,
+    *,
+    add: Sequence[str] = (),
+    model: File | None = None,
+    watch: Watch | None = None,
+) -> DiagnosisReport:
+    """Score every known effect against what the fit leaves: which one is missing?
+
+    Parameters
+    ----------
+    runs, add, model
+        As for :func:`fit`.
+    watch : callable, optional
+        Told the effects of each model that is fitted.
+
+    Returns
+    -------
+    DiagnosisReport
+
+    Raises
+    ------
+    BadInput
+        Naming the file and the place in it.
+
+    Examples
+    --------
+    >>> asked = pkmcal.diagnose("run")                                       # doctest: +SKIP
+    >>> asked.adequate, asked.candidates[0].effect                           # doctest: +SKIP
+    (False, 'backlash')
+    """
+    refit, begin = load_refitter(names_of(runs), tuple(add), path_of(model), watch)
+    return DiagnosisReport.of(diagnosis_report(refit(begin).run))
+
+
+def discover(
+    runs: Runs,
+    *,
+    add: Sequence[str] = (),
+    model: File | None = None,
+    watch: Watch | None = None,
+) -> DiscoveryReport:
+    """Add the best effect, fit again, and go on until nothing more is called for.
+
+    An effect is accepted only if poses that the fit has not seen are predicted no worse with it.
+
+    Parameters
+    ----------
+    runs, add, model
+        As for :func:`fit`; these effects stay in.
+    watch : callable, optional
+        Told the effects of each model that is looked at.
+
+    Returns
+    -------
+    DiscoveryReport
+
+    Raises
+    ------
+    BadInput
+        Naming the file and the place in it.
+
+    Examples
+    --------
+    >>> found = pkmcal.discover("run")                                       # doctest: +SKIP
+    >>> found.effects, found.adequate                                        # doctest: +SKIP
+    (('backlash',), True)
+    >>> found.save("model.toml")                                             # doctest: +SKIP
+    """
+    names = names_of(runs)
+    refit, begin = load_refitter(names, tuple(add), path_of(model), watch)
+    found = discover_run(refit, begin)
+    return DiscoveryReport.of(discovery_report(found), _found=found, _runs=names)

@@ -1,0 +1,128 @@
+"""Fit a model to runs."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from app.analysis import load_rows
+from app.files.models import write_model
+from app.files.runs import outside_runs
+from app.jobs.chosen_runs import File, Runs, names_of, path_of
+from app.jobs.record import Record, Report
+from calib.discover.agreement import runs_at_odds
+from calib.identify import Fit, fit_report
+from calib.identify.staged import fit_effects
+
+
+@dataclass(frozen=True, kw_only=True)
+class BadReading(Record):
+    """A reading that is left out: line of ``points.csv`` (and the run, where there are several)."""
+
+    line: int
+    why: str
+    run: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter(Record):
+    """A parameter as it was found; mm, rad or what ``unit`` says, ``sigma`` 1 standard deviation.
+
+    ``nominal`` is None for the place of the tracker; ``identified``: the readings reduce the
+    tolerance to less than half.
+    """
+
+    name: str
+    value: float
+    sigma: float
+    unit: str
+    nominal: float | None
+    identified: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitReport(Report):
+    """What a fit found (``pkm-fit/1``).
+
+    Errors are RMS of the 3D distance between measured and predicted SMR centre in micrometres;
+    a ``floor`` is what a perfect model would show; ``holdout`` is over poses that were not fitted.
+    """
+
+    FORMAT: ClassVar[str] = "pkm-fit/1"
+    effects: tuple[str, ...]
+    readings: int
+    chi2_per_dof: float | None
+    rms_um: float | None
+    noise_floor_um: float | None
+    holdout_rms_um: float | None
+    holdout_floor_um: float | None
+    parameters: tuple[Parameter, ...]
+    unidentified: tuple[tuple[str, ...], ...]
+    unidentified_words: tuple[str, ...]
+    bad_readings: tuple[BadReading, ...]
+    left_out_readings: int
+    channels_left_aside: Mapping[str, str]
+    remarks: tuple[str, ...]
+    _fit: Fit = field(repr=False, compare=False)
+    _runs: tuple[str, ...] = field(repr=False, compare=False)
+
+    def __getitem__(self, name: str) -> Parameter:
+        """The parameter of that name; raises KeyError."""
+        for parameter in self.parameters:
+            if parameter.name == name:
+                return parameter
+        raise KeyError(name)
+
+    def save(self, file: File) -> None:
+        """Write a model file, correlations included: for ``model=`` and for writing back.
+
+        Raises
+        ------
+        BadInput
+            If the file would lie in a run's folder, or the runs were taken under different
+            compensation.
+        """
+        keep_model(file, self._fit, self._runs)
+
+
+def fit(runs: Runs, *, add: Sequence[str] = (), model: File | None = None) -> FitReport:
+    """Fit geometry, the tracker's place and the chosen effects to one or several runs.
+
+    Parameters
+    ----------
+    runs : path or sequence of paths
+        Run folders; several are fitted together and share geometry and machine effects.
+    add : sequence of str
+        Effects in the model: names, or effect files that end in ``.toml``.
+    model : path, optional
+        A saved model to begin with.
+
+    Returns
+    -------
+    FitReport
+        ``found["leg1.L0"]`` is one parameter.
+
+    Raises
+    ------
+    BadInput
+        Naming the file and the place in it.
+
+    Examples
+    --------
+    >>> found = pkmcal.fit("run", add=["backlash"])                          # doctest: +SKIP
+    >>> found.rms_um, found["backlash.leg3"].value                           # doctest: +SKIP
+    (8.9, 0.0152)
+    """
+    names = names_of(runs)
+    rows, effects = load_rows(names, tuple(add), path_of(model))
+    found = fit_effects(rows, effects)
+    odds = runs_at_odds(found)
+    said = {**fit_report(found), "remarks": [f"{odds}."] if odds else []}
+    return FitReport.of(said, _fit=found, _runs=names)
+
+
+def keep_model(file: File, found: Fit, runs: tuple[str, ...]) -> None:
+    """Write a model file beside the runs, never into one."""
+    path = path_of(file)
+    assert path is not None
+    outside_runs(path, runs)
+    write_model(path, found)

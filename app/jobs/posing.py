@@ -1,0 +1,295 @@
+"""Choose where to measure and where to verify, and predict what accuracy that gives."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+
+from app.files.machines import load_machine
+from app.files.pose_table import Pose, poses_text
+from app.files.poses import full_poses, nest_matrix, render_design, render_pose_file
+from app.files.site import load_site
+from app.jobs.chosen_runs import File, at_least, path_of
+from app.jobs.record import Record, Report
+from calib.errors import BadInput
+from calib.mechanism.description import Machine
+from calib.poses.design import CANDIDATES, TABLE, Design, design_poses
+from calib.poses.information import Accuracy
+from calib.poses.readings import HAN_2020, NestReadings, PoseNoise, Readings
+from calib.poses.verification import VerificationGrid, verification_poses
+
+ANGLES = ("rx", "ry", "rz", "tilt", "azimuth")
+SITE_SIGMA_UM = 5.0
+"""Standard uncertainty per axis that is expected of a reading of a nest."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChosenPose(Record):
+    """A pose: its label, the machine's task coordinates (mm, rad) and the actuators' (mm, rad)."""
+
+    label: str
+    q: tuple[float, ...]
+    coordinates: Mapping[str, float]
+
+    @classmethod
+    def of(cls, table: Mapping[str, Any], **beside: Any) -> Self:
+        """Read a pose; every key but label and q is a coordinate."""
+        rest = {key: float(value) for key, value in table.items() if key not in ("label", "q")}
+        return super().of({"label": table["label"], "q": table["q"], "coordinates": rest})
+
+
+@dataclass(frozen=True, kw_only=True)
+class PredictedAccuracy(Record):
+    """RMS error at fresh poses, position in um and orientation in mdeg."""
+
+    position_rms_um: float
+    orientation_rms_mdeg: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class AccuracyOfCount(PredictedAccuracy):
+    """The same for ``n`` poses."""
+
+    n: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class PosesReport(Report):
+    """Chosen poses in the order of a short path, and what they will give (``pkm-design/1``)."""
+
+    FORMAT: ClassVar[str] = "pkm-design/1"
+    machine: str
+    criterion: str
+    readings: str
+    tolerances_as_priors: bool
+    candidates: int
+    seed: int
+    predicted: PredictedAccuracy
+    random_poses: PredictedAccuracy
+    by_count: tuple[AccuracyOfCount, ...]
+    path_in_strokes: float
+    poses: tuple[ChosenPose, ...]
+    _design: Design = field(repr=False, compare=False)
+    _command: str = field(repr=False, compare=False)
+
+    def by_label(self) -> dict[str, Pose]:
+        """Label -> x, y, z (mm), rx, ry, rz (rad): the platform in the base frame, in order."""
+        return full_poses(self._design.labels, self._design.pose_set)
+
+    def save(self, file: File) -> None:
+        """Write a poses file for measuring; a bare table where its name ends in ``.csv``."""
+        path = Path(file)
+        bare = path.suffix == ".csv"
+        text = (
+            poses_text(self.by_label())
+            if bare
+            else render_design(self._design, self.seed, self._command)
+        )
+        path.write_text(text, encoding="utf-8")
+
+
+@dataclass(frozen=True, kw_only=True)
+class GridReport(Report):
+    """The verification grid of a machine (``pkm-verification/1``).
+
+    ``box`` is what of the workspace it spans (mm, deg); ``poses``: label -> x, y, z (mm),
+    rx, ry, rz (rad), platform in the base frame.
+    """
+
+    FORMAT: ClassVar[str] = "pkm-verification/1"
+    machine: str
+    workspace_scale: float
+    box: Mapping[str, tuple[float, ...]]
+    poses: Mapping[str, tuple[float, ...]]
+    _grid: VerificationGrid = field(repr=False, compare=False)
+
+    def by_label(self) -> dict[str, Pose]:
+        """Label -> x, y, z (mm), rx, ry, rz (rad): the platform in the base frame, in order."""
+        return self._grid.by_label
+
+    def save(self, file: File) -> None:
+        """Write a poses file."""
+        command = f"pkmcal poses {self.machine} --verification"
+        title = f"{len(self._grid.labels)} verification poses for {self.machine}"
+        about = {"workspace_scale": self._grid.scale}
+        text = render_pose_file(self._grid.labels, self._grid.pose_set, title, about, command)
+        Path(file).write_text(text, encoding="utf-8")
+
+
+def choose_poses(
+    machine: str | os.PathLike[str] | None = None,
+    n: int = 29,
+    *,
+    site: File | None = None,
+    criterion: Literal["I", "D"] = "I",
+    priors: bool = True,
+    sigma_um: float | None = None,
+    angle_mdeg: float | None = None,
+    candidates: int = CANDIDATES,
+    seed: int = 1,
+) -> PosesReport:
+    """Choose measurement poses among reachable ones, and predict what accuracy they give.
+
+    Parameters
+    ----------
+    machine : str or path, optional
+        A shipped machine's name, or a machine file; that of the site if missing.
+    n : int
+        How many poses.
+    site : path, optional
+        A site file: its nests are read. Without, whole poses are, with the noise of Han et al.
+        2020.
+    criterion : "I" or "D"
+        Smallest predicted pose error, or most information about the parameters.
+    priors : bool
+        Use the machine file's tolerances as priors.
+    sigma_um, angle_mdeg : float, optional
+        Standard uncertainty of a reading per axis, um, and of an angle, mdeg, where whole poses
+        are read.
+    candidates : int
+        Reachable poses among which is chosen.
+    seed : int
+        Draws the candidates.
+
+    Returns
+    -------
+    PosesReport
+
+    Raises
+    ------
+    BadInput
+        For a machine or site that cannot be read, and uncertainties that are not positive.
+
+    Examples
+    --------
+    >>> chosen = pkmcal.choose_poses("hexapod", 29)                          # doctest: +SKIP
+    >>> chosen.predicted.position_rms_um                                     # doctest: +SKIP
+    6.7
+    >>> chosen.save("poses.toml")                                            # doctest: +SKIP
+    """
+    at_least(1, n=n, candidates=candidates)
+    named = "" if machine is None else os.fspath(machine)
+    path = path_of(site)
+    described = _machine(named, path)
+    found = design_poses(
+        described,
+        _readings(described, path, sigma_um, angle_mdeg),
+        n,
+        np.random.default_rng(seed),
+        criterion=criterion,
+        priors=priors,
+        candidates=candidates,
+        counts=[count for count in TABLE if count <= candidates],
+    )
+    # What brings the same poses again stands in the file.
+    command = (
+        f"pkmcal poses {named or described.name} --n {n} "
+        f"--criterion {criterion} --seed {seed} --candidates {candidates}"
+    )
+    command += "" if priors else " --no-priors"
+    command += f" --site {site}" if site else ""
+    command += f" --sigma-um {sigma_um:g}" if sigma_um is not None else ""
+    command += f" --angle-mdeg {angle_mdeg:g}" if angle_mdeg is not None else ""
+    return PosesReport.of(_said(found, seed), _design=found, _command=command)
+
+
+def verification_grid(
+    machine: str | os.PathLike[str] | None = None, *, site: File | None = None
+) -> GridReport:
+    """The poses at which a machine is verified: 27 nodes with 8 orientations, all within reach.
+
+    Parameters
+    ----------
+    machine : str or path, optional
+        A shipped machine's name, or a machine file; that of the site if missing.
+    site : path, optional
+        A site file.
+
+    Returns
+    -------
+    GridReport
+
+    Raises
+    ------
+    BadInput
+        For a machine or site that cannot be read.
+
+    Examples
+    --------
+    >>> len(pkmcal.verification_grid("hexapod").poses)                       # doctest: +SKIP
+    216
+    """
+    described = _machine("" if machine is None else os.fspath(machine), path_of(site))
+    grid = verification_poses(described)
+    box = {
+        name: [low, high] if name in "xyz" else [float(np.rad2deg(low)), float(np.rad2deg(high))]
+        for name, (low, high) in grid.box.items()
+    }
+    said = {
+        "format": "pkm-verification/1",
+        "machine": described.name,
+        "workspace_scale": grid.scale,
+        "box": box,
+        "poses": grid.by_label,
+    }
+    return GridReport.of(said, _grid=grid)
+
+
+def _machine(name: str, site: Path | None) -> Machine:
+    if name:
+        return load_machine(name)
+    if site:
+        return load_site(site).machine
+    raise BadInput("no machine is named", remedy="Write pkmcal poses hexapod, or give --site.")
+
+
+def _readings(
+    machine: Machine, site_file: Path | None, sigma_um: float | None, angle_mdeg: float | None
+) -> Readings:
+    """Nests of the site, or whole poses with the noise of Han et al. 2020 if nothing is said."""
+    for value, what in ((sigma_um, "--sigma-um"), (angle_mdeg, "--angle-mdeg")):
+        if value is not None and value <= 0.0:
+            raise BadInput(f"{what} is {value:g}", remedy="Give a positive uncertainty.")
+    if site_file:
+        site = load_site(site_file)
+        sigma = (SITE_SIGMA_UM if sigma_um is None else sigma_um) * 1e-3
+        return NestReadings(nest_matrix(site.platform_nests), sigma, nest_matrix(site.base_nests))
+    sigma = HAN_2020.position_sigma if sigma_um is None else sigma_um * 1e-3
+    if angle_mdeg is not None:
+        return PoseNoise(sigma, float(np.deg2rad(angle_mdeg * 1e-3)))
+    turns = any(name in ANGLES for name in machine.task.coordinates)
+    return PoseNoise(sigma, HAN_2020.angle_sigma if turns else None)
+
+
+def _accuracy(accuracy: Accuracy) -> dict[str, float]:
+    return {
+        "position_rms_um": accuracy.position_um,
+        "orientation_rms_mdeg": accuracy.orientation_mdeg,
+    }
+
+
+def _said(design: Design, seed: int) -> dict[str, Any]:
+    """A choice of poses as plain data."""
+    names = design.machine.task.coordinates
+    return {
+        "format": "pkm-design/1",
+        "machine": design.machine.name,
+        "criterion": design.criterion,
+        "readings": design.readings,
+        "tolerances_as_priors": design.priors,
+        "candidates": design.candidates,
+        "seed": seed,
+        "predicted": _accuracy(design.accuracy),
+        "random_poses": _accuracy(design.random),
+        "by_count": [{"n": n, **_accuracy(a)} for n, a in design.by_count],
+        "path_in_strokes": design.length,
+        "poses": [
+            {"label": label, **dict(zip(names, task, strict=True)), "q": q}
+            for label, task, q in zip(
+                design.labels, design.pose_set.task.T, design.pose_set.q.T, strict=True
+            )
+        ],
+    }
