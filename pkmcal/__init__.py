@@ -1,1 +1,145 @@
-"""Calibrate parallel-kinematic machines."""
+"""Calibrate parallel-kinematic machines from scripts and notebooks.
+
+::
+
+    import pkmcal
+
+    pkmcal.simulate("hexapod", "run", seed=3, effects={"backlash.leg3": 0.015})
+    found = pkmcal.discover("run")
+    print(found.effects, found.adequate)
+    found.save("model.toml")
+
+The calls are those of the verbs: a question gets the same answer here and on the command line.
+Answers are records with typed fields; ``to_json()`` is what the verb prints with ``--json``.
+:class:`Station` measures, verifies and writes back without a person; :func:`mock_station` is one
+to practise on. See docs/scripting.md.
+
+Units: mm, s, rad, kg, N, deg C, where a name does not say another one (``_um``, ``_deg``).
+
+What bad input is, is said by :class:`BadInput`; a device that fails, by :class:`DeviceError`; a
+safety gate that says no, by :class:`GateRefused`; an operator who stops, by
+:class:`StoppedByOperator`. ``import pkmcal`` is light: what a name needs is loaded when it is first
+used.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from pkmcal.names import NameTaken, claim
+
+if TYPE_CHECKING:
+    from app.errors import GateRefused as GateRefused
+    from app.errors import StoppedByOperator as StoppedByOperator
+    from app.files.machines import load_machine as load_machine
+    from app.jobs.applying import AcceptReport as AcceptReport
+    from app.jobs.applying import ApplyReport as ApplyReport
+    from app.jobs.applying import SetsReport as SetsReport
+    from app.jobs.applying import UndoReport as UndoReport
+    from app.jobs.chosen_runs import load_runs as load_runs
+    from app.jobs.comparing import CompareReport as CompareReport
+    from app.jobs.comparing import compare as compare
+    from app.jobs.discovering import DiagnosisReport as DiagnosisReport
+    from app.jobs.discovering import DiscoveryReport as DiscoveryReport
+    from app.jobs.discovering import diagnose as diagnose
+    from app.jobs.discovering import discover as discover
+    from app.jobs.fitting import FitReport as FitReport
+    from app.jobs.fitting import fit as fit
+    from app.jobs.following_up import FollowUpReport as FollowUpReport
+    from app.jobs.following_up import design as design
+    from app.jobs.measuring import SessionReport as SessionReport
+    from app.jobs.posing import GridReport as GridReport
+    from app.jobs.posing import PosesReport as PosesReport
+    from app.jobs.posing import choose_poses as choose_poses
+    from app.jobs.posing import verification_grid as verification_grid
+    from app.jobs.simulating import SimulationReport as SimulationReport
+    from app.jobs.simulating import simulate as simulate
+    from app.jobs.verifying import VerificationReport as VerificationReport
+    from calib.errors import BadInput as BadInput
+    from drivers.errors import DeviceError as DeviceError
+    from pkmcal.async_station import AsyncStation as AsyncStation
+    from pkmcal.mock import mock_station as mock_station
+    from pkmcal.station import Station as Station
+
+_HOMES = {
+    "AcceptReport": "app.jobs.applying",
+    "ApplyReport": "app.jobs.applying",
+    "AsyncStation": "pkmcal.async_station",
+    "BadInput": "calib.errors",
+    "CompareReport": "app.jobs.comparing",
+    "DeviceError": "drivers.errors",
+    "DiagnosisReport": "app.jobs.discovering",
+    "DiscoveryReport": "app.jobs.discovering",
+    "FitReport": "app.jobs.fitting",
+    "FollowUpReport": "app.jobs.following_up",
+    "GateRefused": "app.errors",
+    "GridReport": "app.jobs.posing",
+    "PosesReport": "app.jobs.posing",
+    "SessionReport": "app.jobs.measuring",
+    "SetsReport": "app.jobs.applying",
+    "SimulationReport": "app.jobs.simulating",
+    "Station": "pkmcal.station",
+    "StoppedByOperator": "app.errors",
+    "UndoReport": "app.jobs.applying",
+    "VerificationReport": "app.jobs.verifying",
+    "choose_poses": "app.jobs.posing",
+    "compare": "app.jobs.comparing",
+    "design": "app.jobs.following_up",
+    "diagnose": "app.jobs.discovering",
+    "discover": "app.jobs.discovering",
+    "fit": "app.jobs.fitting",
+    "load_machine": "app.files.machines",
+    "load_runs": "app.jobs.chosen_runs",
+    "mock_station": "pkmcal.mock",
+    "simulate": "app.jobs.simulating",
+    "verification_grid": "app.jobs.posing",
+}
+"""Where each public name is defined."""
+
+__all__ = [
+    "AcceptReport",
+    "ApplyReport",
+    "AsyncStation",
+    "BadInput",
+    "CompareReport",
+    "DeviceError",
+    "DiagnosisReport",
+    "DiscoveryReport",
+    "FitReport",
+    "FollowUpReport",
+    "GateRefused",
+    "GridReport",
+    "NameTaken",
+    "PosesReport",
+    "SessionReport",
+    "SetsReport",
+    "SimulationReport",
+    "Station",
+    "StoppedByOperator",
+    "UndoReport",
+    "VerificationReport",
+    "choose_poses",
+    "compare",
+    "design",
+    "diagnose",
+    "discover",
+    "fit",
+    "load_machine",
+    "load_runs",
+    "mock_station",
+    "simulate",
+    "verification_grid",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name when it is first used; the names of our packages are claimed before."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    claim()
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return list(__all__)

@@ -4,7 +4,7 @@ import json
 import queue
 import subprocess
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,12 @@ END_DEADLINE_S = 10.0
 
 
 @contextmanager
-def mock_station(machine: str, seed: int, scale: float, folder: Path) -> Iterator[Path]:
+def mock_station(
+    machine: str, seed: int, scale: float, folder: Path, arguments: Sequence[str] = ()
+) -> Iterator[Path]:
     """Start a station with three SMRs; its site file is yielded, the process ends afterwards.
+
+    ``arguments`` are further ones of ``pkmcal mock``.
 
     Raises
     ------
@@ -28,7 +32,7 @@ def mock_station(machine: str, seed: int, scale: float, folder: Path) -> Iterato
     site, complaints = folder / "site.toml", folder / "station.log"
     command = command_of("mock", machine, "--json", "--until-stdin-closes")
     command += ["--seed", str(seed), "--scale", str(scale), "--smrs", "3"]
-    command += ["--site", str(site), "--nvm", str(folder / "controller-memory.json")]
+    command += ["--site", str(site), "--nvm", str(folder / "controller-memory.json"), *arguments]
     with complaints.open("w", encoding="utf-8") as log:
         station = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True

@@ -10,16 +10,16 @@ import numpy as np
 from app.analysis import load_refitter
 from app.files.runs import outside_runs
 from app.jobs.chosen_runs import File, Runs, names_of, path_of
-from app.jobs.fitting import BadReading
+from app.jobs.fitting import BadReadingEntry
 from app.jobs.record import Record, Report
-from calib.discover.compare import Comparison, compare_fit
+from calib.discover.compare import RunComparison, compare_fit
 from calib.discover.compare_report import compare_report
 from calib.discover.discovery import SEED
 from calib.discover.terms import propose as propose_terms
 
 
 @dataclass(frozen=True, kw_only=True)
-class Repeatability(Record):
+class RepeatabilityEntry(Record):
     """Scatter of repeats, as a multiple of the stated uncertainty, and its part of the misfit."""
 
     dof: int
@@ -29,7 +29,7 @@ class Repeatability(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bin(Record):
+class BinEntry(Record):
     """Mean residual over a span of a variable, in the unit of its dependence, 1 sigma."""
 
     from_: float
@@ -40,7 +40,7 @@ class Bin(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Dependence(Record):
+class DependenceEntry(Record):
     """How the residual depends on one variable; ``unit`` (um or urad) is that of the bins."""
 
     channel: str
@@ -50,11 +50,11 @@ class Dependence(Record):
     shows_in: str
     period: float | None
     unit: str
-    bins: tuple[Bin, ...]
+    bins: tuple[BinEntry, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Together(Record):
+class TogetherEntry(Record):
     """Whether readings of a pose, or neighbours in time, err alike."""
 
     channel: str
@@ -63,7 +63,7 @@ class Together(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ActuatorResidual(Record):
+class ActuatorEntry(Record):
     """RMS residual in one actuator's coordinate, um or urad."""
 
     actuator: str
@@ -72,7 +72,7 @@ class ActuatorResidual(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PoseResidual(Record):
+class WorstPoseEntry(Record):
     """A pose that is off: position in mm and shift in um, base frame."""
 
     pose: str
@@ -81,7 +81,7 @@ class PoseResidual(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ProposedTerm(Record):
+class TermEntry(Record):
     """A formula that would explain what is left; ``file`` where it is stable and was written."""
 
     formula: str
@@ -101,16 +101,16 @@ class CompareReport(Report):
     rms_um: float | None
     noise_floor_um: float | None
     chi2_per_dof: float | None
-    repeatability: Repeatability | None
-    reference_repeatability: Repeatability | None
-    structure: tuple[Dependence, ...]
-    together: tuple[Together, ...]
-    actuators: tuple[ActuatorResidual, ...]
-    worst_poses: tuple[PoseResidual, ...]
-    bad_readings: tuple[BadReading, ...]
+    repeatability: RepeatabilityEntry | None
+    reference_repeatability: RepeatabilityEntry | None
+    structure: tuple[DependenceEntry, ...]
+    together: tuple[TogetherEntry, ...]
+    actuators: tuple[ActuatorEntry, ...]
+    worst_poses: tuple[WorstPoseEntry, ...]
+    bad_readings: tuple[BadReadingEntry, ...]
     advice: str
-    proposed: tuple[ProposedTerm, ...] = ()
-    _found: Comparison = field(repr=False, compare=False)
+    proposed: tuple[TermEntry, ...] = ()
+    _found: RunComparison = field(repr=False, compare=False)
     _runs: tuple[str, ...] = field(repr=False, compare=False)
 
     def draw(self, folder: File) -> list[Path]:
@@ -175,7 +175,7 @@ def compare(
     return CompareReport.of(said, _found=found, _runs=names)
 
 
-def _propose(found: Comparison, path: Path) -> list[dict[str, Any]]:
+def _propose(found: RunComparison, path: Path) -> list[dict[str, Any]]:
     """Write every stable term: FILE, FILE-2 ...; what was found, stable or not."""
     listed: list[dict[str, Any]] = []
     stable = 0

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from app.analysis import load_refitter
 from app.jobs.chosen_runs import File, Runs, names_of, path_of
-from app.jobs.fitting import BadReading, keep_model
+from app.jobs.fitting import BadReadingEntry, keep_model
 from app.jobs.record import Record, Report
 from calib.discover.discovery import discover_run, stage_of
 from calib.discover.report import diagnosis_report, discovery_report
@@ -17,7 +17,7 @@ Watch = Callable[[tuple[str, ...]], None]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Size(Record):
+class SizeEntry(Record):
     """An effect's parameter: mm, rad, K, N or what ``unit`` says; sigma 1 standard deviation."""
 
     name: str
@@ -27,7 +27,7 @@ class Size(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Baseline(Record):
+class BaselineEntry(Record):
     """The model that is asked, and how well it does; errors as in :class:`FitReport`."""
 
     effects: tuple[str, ...]
@@ -39,7 +39,7 @@ class Baseline(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CandidateEffect(Record):
+class CandidateEntry(Record):
     """An effect that may be missing.
 
     ``p_value`` pays for having looked at all of them; ``visible`` is the part of its signature
@@ -51,11 +51,11 @@ class CandidateEffect(Record):
     rms_after_um: float | None
     holdout_rms_after_um: float | None
     visible: float
-    parameters: tuple[Size, ...]
+    parameters: tuple[SizeEntry, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Unexplained(Record):
+class UnexplainedEntry(Record):
     """What no known effect explains, and on which columns it depends, strongest first."""
 
     significant: bool
@@ -68,18 +68,18 @@ class DiagnosisReport(Report):
     """What is missing from a model (``pkm-diagnosis/1``); the best candidate first."""
 
     FORMAT: ClassVar[str] = "pkm-diagnosis/1"
-    baseline: Baseline
+    baseline: BaselineEntry
     adequate: bool
-    candidates: tuple[CandidateEffect, ...]
+    candidates: tuple[CandidateEntry, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
-    unexplained: Unexplained
-    bad_readings: tuple[BadReading, ...]
+    unexplained: UnexplainedEntry
+    bad_readings: tuple[BadReadingEntry, ...]
     unavailable: Mapping[str, str]
     advice: str
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stair(Record):
+class StepEntry(Record):
     """A model on the way; None as ``added`` is the one to begin with."""
 
     added: str | None
@@ -96,13 +96,13 @@ class DiscoveryReport(Report):
     """What was found step by step (``pkm-discovery/1``); errors as in :class:`FitReport`."""
 
     FORMAT: ClassVar[str] = "pkm-discovery/1"
-    steps: tuple[Stair, ...]
+    steps: tuple[StepEntry, ...]
     effects: tuple[str, ...]
     adequate: bool
     indistinguishable: tuple[tuple[str, ...], ...]
-    unexplained: Unexplained
-    bad_readings: tuple[BadReading, ...]
-    parameters: tuple[Size, ...]
+    unexplained: UnexplainedEntry
+    bad_readings: tuple[BadReadingEntry, ...]
+    parameters: tuple[SizeEntry, ...]
     refused: tuple[str, ...]
     advice: str
     _found: Discovery = field(repr=False, compare=False)

@@ -15,7 +15,7 @@ from calib.identify.staged import fit_effects
 
 
 @dataclass(frozen=True, kw_only=True)
-class BadReading(Record):
+class BadReadingEntry(Record):
     """A reading that is left out: line of ``points.csv`` (and the run, where there are several)."""
 
     line: int
@@ -24,7 +24,7 @@ class BadReading(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameter(Record):
+class ParameterEntry(Record):
     """A parameter as it was found; mm, rad or what ``unit`` says, ``sigma`` 1 standard deviation.
 
     ``nominal`` is None for the place of the tracker; ``identified``: the readings reduce the
@@ -55,17 +55,17 @@ class FitReport(Report):
     noise_floor_um: float | None
     holdout_rms_um: float | None
     holdout_floor_um: float | None
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[ParameterEntry, ...]
     unidentified: tuple[tuple[str, ...], ...]
     unidentified_words: tuple[str, ...]
-    bad_readings: tuple[BadReading, ...]
+    bad_readings: tuple[BadReadingEntry, ...]
     left_out_readings: int
     channels_left_aside: Mapping[str, str]
     remarks: tuple[str, ...]
     _fit: Fit = field(repr=False, compare=False)
     _runs: tuple[str, ...] = field(repr=False, compare=False)
 
-    def __getitem__(self, name: str) -> Parameter:
+    def __getitem__(self, name: str) -> ParameterEntry:
         """The parameter of that name; raises KeyError."""
         for parameter in self.parameters:
             if parameter.name == name:

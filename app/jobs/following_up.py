@@ -12,7 +12,7 @@ from app.files.pose_table import Pose
 from app.files.poses import full_poses, render_pose_file
 from app.files.runs import outside_runs
 from app.jobs.chosen_runs import File, Runs, at_least, names_of, path_of
-from app.jobs.posing import ChosenPose
+from app.jobs.posing import PoseEntry
 from app.jobs.record import Report
 from calib.discover.design import CANDIDATES, FollowUpPlan, design_follow_up
 from calib.effects import effect_named
@@ -40,7 +40,7 @@ class FollowUpReport(Report):
     conditions: Mapping[str, float]
     right_now: Mapping[str, float]
     right_then: Mapping[str, float]
-    poses: tuple[ChosenPose, ...]
+    poses: tuple[PoseEntry, ...]
     advice: str
     _plan: FollowUpPlan = field(repr=False, compare=False)
     _again: Mapping[str, Any] = field(repr=False, compare=False)

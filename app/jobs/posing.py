@@ -27,7 +27,7 @@ SITE_SIGMA_UM = 5.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class ChosenPose(Record):
+class PoseEntry(Record):
     """A pose: its label, the machine's task coordinates (mm, rad) and the actuators' (mm, rad)."""
 
     label: str
@@ -42,7 +42,7 @@ class ChosenPose(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PredictedAccuracy(Record):
+class AccuracyEntry(Record):
     """RMS error at fresh poses, position in um and orientation in mdeg."""
 
     position_rms_um: float
@@ -50,7 +50,7 @@ class PredictedAccuracy(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
-class AccuracyOfCount(PredictedAccuracy):
+class CountEntry(AccuracyEntry):
     """The same for ``n`` poses."""
 
     n: int
@@ -67,11 +67,11 @@ class PosesReport(Report):
     tolerances_as_priors: bool
     candidates: int
     seed: int
-    predicted: PredictedAccuracy
-    random_poses: PredictedAccuracy
-    by_count: tuple[AccuracyOfCount, ...]
+    predicted: AccuracyEntry
+    random_poses: AccuracyEntry
+    by_count: tuple[CountEntry, ...]
     path_in_strokes: float
-    poses: tuple[ChosenPose, ...]
+    poses: tuple[PoseEntry, ...]
     _design: Design = field(repr=False, compare=False)
     _command: str = field(repr=False, compare=False)
 

@@ -12,6 +12,7 @@ from app import answer
 from app.console import ConsoleFace, in_daemon_thread, stopping, unattended
 from app.files.fits import SavedFit, read_fit
 from app.files.site import Site, load_site
+from app.jobs.applying import apply_report
 from app.session.station import Station
 from app.writeback.gates import LIMITS, Gates
 from app.writeback.procedure import Applied, WriteBack
@@ -117,26 +118,13 @@ async def _apply(
             await station.connect()
             if dry_run:
                 _, proposal = await job.propose()
-                return _json(proposal, None), table(proposal) + "\nnothing was written"
+                return apply_report(proposal).to_json(), table(proposal) + "\nnothing was written"
             applied = await job.run()
     finally:
         leave()
         await station.close()
-    return _json(applied.proposal, applied), table(applied.proposal) + "\n" + _words(applied)
-
-
-def _json(proposal: Proposal, applied: Applied | None) -> dict[str, Any]:
-    return {
-        "format": "pkm-apply/1",
-        "written": applied is not None,
-        "changes": [{**vars(c), "in_sigmas": c.in_sigmas} for c in proposal.changes],
-        "left_out": dict(proposal.left_out),
-        "snapshot": applied and applied.snapshot.number,
-        "kept": applied and applied.kept.number,
-        "check_before": applied and vars(applied.before),
-        "check_after": applied and vars(applied.after),
-        "noise_peak_um": applied and applied.noise_peak_um,
-    }
+    report = apply_report(applied.proposal, applied)
+    return report.to_json(), table(applied.proposal) + "\n" + _words(applied)
 
 
 def table(proposal: Proposal) -> str:

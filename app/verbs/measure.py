@@ -2,26 +2,15 @@
 
 import asyncio
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import click
 
 from app import answer
 from app.console import run_on_console, unattended
-from app.files.poses import read_any_poses
 from app.files.site import load_site
-from app.session import Outcome, PlanOptions, Session, measure_plan
-from app.session.plans import Order, order_for
-
-
-def outcome_json(outcome: Outcome) -> dict[str, Any]:
-    """What a finished session answers."""
-    return {
-        "format": "pkm-session/1",
-        "session": str(outcome.folder),
-        "run": str(outcome.run_folder),
-        "readings": outcome.readings,
-    }
+from app.jobs.measuring import begin_measuring, session_report
+from app.session.plans import Order
 
 
 @click.command()
@@ -87,19 +76,17 @@ def command(
     goes on where the session was. The whole path is checked against all limits before the first
     move.
     """
-    site = load_site(site_file)
-    poses = read_any_poses(poses_file, site.machine)
-    options = PlanOptions(
-        order=cast(Order, order) if order else order_for(site),
+    session = begin_measuring(
+        load_site(site_file),
+        poses_file,
+        folder=folder,
+        order=cast(Order, order) if order else None,
         reference_every=reference_every,
         cycles=cycles,
         warm_up=not no_warm_up,
         title=title,
+        unattended=unattended(alone),
     )
-    plan = measure_plan(site, poses, options)
-    session = Session.create(site, plan, folder, unattended=unattended(alone))
     answer.say(f"session {session.folder}")
-    outcome = asyncio.run(run_on_console(session, quiet=as_json))
-    answer.show(
-        outcome_json(outcome), as_json, f"{outcome.readings} readings in {outcome.run_folder}"
-    )
+    report = session_report(asyncio.run(run_on_console(session, quiet=as_json)))
+    answer.show(report.to_json(), as_json, f"{report.readings} readings in {report.run}")

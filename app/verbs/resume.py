@@ -7,9 +7,7 @@ import click
 
 from app import answer
 from app.console import run_on_console, unattended
-from app.session import Session
-from app.session.folder import latest_session
-from app.verbs.measure import outcome_json
+from app.jobs.measuring import begin_again, session_report
 
 
 @click.command()
@@ -28,10 +26,7 @@ def command(session_folder: Path | None, folder: Path, alone: bool, as_json: boo
     A step that had begun and has no result is in doubt: the controller is asked where the machine
     was sent, the last reference is read again, and the step is done anew.
     """
-    chosen = session_folder or latest_session(folder)
-    session = Session.reopen(chosen, unattended=unattended(alone))
+    session = begin_again(session_folder, folder=folder, unattended=unattended(alone))
     answer.say(f"session {session.folder}")
-    outcome = asyncio.run(run_on_console(session, quiet=as_json))
-    answer.show(
-        outcome_json(outcome), as_json, f"{outcome.readings} readings in {outcome.run_folder}"
-    )
+    report = session_report(asyncio.run(run_on_console(session, quiet=as_json)))
+    answer.show(report.to_json(), as_json, f"{report.readings} readings in {report.run}")

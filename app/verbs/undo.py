@@ -9,11 +9,8 @@ import click
 from app import answer
 from app.console import ConsoleFace
 from app.files.site import load_site
-from app.session.known import Snapshot, Snapshots
+from app.jobs.applying import SetsReport, accept_held, bring_back, known_sets
 from app.session.station import Station
-from app.writeback.procedure import accept, undo
-from app.writeback.transfer import snapshots_of
-from calib.errors import BadInput
 
 
 @click.command()
@@ -53,53 +50,31 @@ async def _run(
     leave = station.observers.watch(ConsoleFace(lambda *_: None, 0, quiet=quiet).hear)
     try:
         await station.connect()
-        snapshots = snapshots_of(station)
         if only_list:
-            return _listed(snapshots)
+            return _listed(known_sets(station))
         if take:
-            saved = await accept(station)
-            text = f"set {saved.number} is what the controller holds, and known from now on"
-            return {"format": "pkm-undo/1", "accepted": saved.number}, text
-        chosen = snapshots.get(number) if number is not None else _before_last(snapshots)
-        back = await undo(station, chosen, f"undo to {chosen.number}")
+            taken = await accept_held(station)
+            text = f"set {taken.accepted} is what the controller holds, and known from now on"
+            return taken.to_json(), text
+        report = await bring_back(station, number)
     finally:
         leave()
         await station.close()
+    back = report.snapshot
     text = f"set {back.number} ({back.why}, {back.taken_utc}) is back in the controller"
-    return {"format": "pkm-undo/1", "restored": back.number}, text
+    return report.to_json(), text
 
 
-def _before_last(snapshots: Snapshots) -> Snapshot:
-    """The set that was saved before the last apply."""
-    before = [s for s in snapshots.all() if s.why.startswith("before applying")]
-    if not before:
-        raise BadInput(
-            "nothing was applied to this controller",
-            place=str(snapshots.folder),
-            remedy="Name a set with --to; --list shows them",
-        )
-    return before[-1]
-
-
-def _listed(snapshots: Snapshots) -> tuple[dict[str, Any], str]:
-    sets = snapshots.all()
-    expected = snapshots.expected()
+def _listed(report: SetsReport) -> tuple[dict[str, Any], str]:
     rows = [
         (
             str(s.number), s.taken_utc, f"{s.checksum:#010x}",
-            "in the controller" if expected and expected.values == s.values else "", s.why,
+            "in the controller" if report.present(s.number) else "", s.why,
         )
-        for s in sets
+        for s in report.sets
     ]  # fmt: skip
-    data = {
-        "format": "pkm-undo/1",
-        "sets": [
-            {"number": s.number, "taken_utc": s.taken_utc, "why": s.why, "checksum": s.checksum}
-            for s in sets
-        ],
-        "unknown": snapshots.unknown(),
-    }
     lines = [answer.table(("set", "taken (UTC)", "checksum", "", "why"), rows)] if rows else []
-    if snapshots.unknown():
-        lines.append(f"PARAMETERS UNKNOWN, motion is blocked: {snapshots.unknown()}")
-    return data, "\n".join(lines) or "no sets yet: nothing was applied to this controller"
+    if report.unknown:
+        lines.append(f"PARAMETERS UNKNOWN, motion is blocked: {report.unknown}")
+    empty = "no sets yet: nothing was applied to this controller"
+    return report.to_json(), "\n".join(lines) or empty

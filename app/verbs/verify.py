@@ -1,7 +1,6 @@
 """Measure the error that is left, over a grid of poses"""
 
 import asyncio
-import json
 from pathlib import Path
 from typing import Any
 
@@ -9,13 +8,9 @@ import click
 
 from app import answer
 from app.console import run_on_console, unattended
-from app.files.poses import read_any_poses
 from app.files.site import load_site
-from app.files.text import read_text
-from app.session import Session
-from app.verification import FORMAT, REFERENCE_EVERY, judge_session, verification_plan
-from calib.errors import BadInput
-from calib.poses import verification_poses
+from app.jobs.verifying import begin_verifying, read_before, verification_report
+from app.verification import REFERENCE_EVERY
 
 
 @click.command()
@@ -71,34 +66,22 @@ def command(
     show. Nothing is fitted and nothing is written to the controller.
     """
     site = load_site(site_file)
-    before = _read_before(before_file) if before_file else None
-    poses = (
-        read_any_poses(poses_file, site.machine)
-        if poses_file
-        else verification_poses(site.machine).by_label
+    before = read_before(before_file) if before_file else None
+    session = begin_verifying(
+        site,
+        poses_file,
+        folder=folder,
+        truth=truth,
+        reference_every=reference_every,
+        unattended=unattended(alone),
     )
-    plan = verification_plan(site, poses, truth=truth, reference_every=reference_every)
-    session = Session.create(site, plan, folder, unattended=unattended(alone))
     answer.say(f"session {session.folder}")
     asyncio.run(run_on_console(session, quiet=as_json))
-    found = judge_session(session.folder).to_json()
-    found["session"] = str(session.folder)
-    found["before"] = before and {k: before[k] for k in ("measured", "truth", "noise_alone")}
+    report = verification_report(session.folder, before)
     if save_file:
-        save_file.write_text(json.dumps(found, indent=1), encoding="utf-8")
+        report.save(save_file)
+    found = report.to_json()
     answer.show(found, as_json, words(found))
-
-
-def _read_before(path: Path) -> dict[str, Any]:
-    try:
-        data: dict[str, Any] = json.loads(read_text(path))
-        if data["format"] != FORMAT or "measured" not in data:
-            raise ValueError("another format")
-    except (ValueError, KeyError, TypeError) as error:
-        raise BadInput(
-            f"not a saved verification ({error})", place=str(path), remedy="pkmcal verify --save"
-        ) from error
-    return data
 
 
 def words(found: dict[str, Any]) -> str:

@@ -128,3 +128,29 @@ def test_a_package_written_over_ours_is_named(text: str, tmp_path: Path) -> None
     assert done.returncode == 2
     assert str(site / "drivers") in done.stderr
     assert "environment of its own" in done.stderr
+
+
+def test_a_script_beside_such_a_file_is_told(tmp_path: Path) -> None:
+    lab = lab_of(tmp_path / "lab", ("calib",))
+    script = lab / "measure_tonight.py"
+    script.write_text(
+        "import pkmcal\n"
+        "try:\n"
+        "    pkmcal.fit('run')\n"
+        "except pkmcal.NameTaken as taken:\n"
+        "    print(taken)\n",
+        "utf-8",
+    )
+    done = run_in(tmp_path, [sys.executable, str(script)])
+    assert done.returncode == 0, done.stderr
+    assert str(lab / "calib.py") in done.stdout
+
+
+def test_a_script_that_has_its_own_module_in_memory_is_told(tmp_path: Path) -> None:
+    (tmp_path / "drivers.py").write_text("SPEED = 3\n", "utf-8")
+    script = tmp_path / "measure_tonight.py"
+    script.write_text("import drivers\nfrom pkmcal import Station\n", "utf-8")
+    done = run_in(tmp_path, [sys.executable, str(script)])
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].startswith("pkmcal.names.NameTaken: ")
+    assert str(tmp_path / "drivers.py") in done.stderr

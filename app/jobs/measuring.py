@@ -1,0 +1,84 @@
+"""Measure poses, and go on with a session that ended early."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from app.files.pose_table import Pose
+from app.files.poses import read_any_poses
+from app.files.site import Site
+from app.jobs.chosen_runs import File, path_of
+from app.jobs.record import Report
+from app.session import Outcome, PlanOptions, Session, measure_plan
+from app.session.folder import latest_session
+from app.session.plans import Order, order_for
+from app.session.station import Station
+
+
+@dataclass(frozen=True, kw_only=True)
+class SessionReport(Report):
+    """A finished session (``pkm-session/1``): its folder, the run's folder, how many readings."""
+
+    FORMAT: ClassVar[str] = "pkm-session/1"
+    session: str
+    run: str
+    readings: int
+
+
+def begin_measuring(
+    site: Site,
+    poses: File | Mapping[str, Pose],
+    *,
+    folder: Path,
+    order: Order | None = None,
+    reference_every: int = 10,
+    cycles: int = 1,
+    warm_up: bool = True,
+    title: str = "",
+    station: Station | None = None,
+    unattended: bool,
+) -> Session:
+    """Make a session that visits poses; ``order`` is by the SMRs at hand if None.
+
+    Raises
+    ------
+    BadInput
+        For poses that cannot be read, and fewer SMRs than the order needs.
+    """
+    options = PlanOptions(
+        order=order or order_for(site),
+        reference_every=reference_every,
+        cycles=cycles,
+        warm_up=warm_up,
+        title=title,
+    )
+    plan = measure_plan(site, read_if_file(poses, site), options)
+    return Session.create(site, plan, folder, station=station, unattended=unattended)
+
+
+def begin_again(
+    session: File | None, *, folder: Path, station: Station | None = None, unattended: bool
+) -> Session:
+    """Reopen a session that ended early, or the latest one in ``folder``; raises BadInput."""
+    chosen = path_of(session) or latest_session(folder)
+    return Session.reopen(chosen, station=station, unattended=unattended)
+
+
+def read_if_file(poses: File | Mapping[str, Pose], site: Site) -> Mapping[str, Pose]:
+    """Label -> pose as it is given, or from a poses file."""
+    if isinstance(poses, str | os.PathLike):
+        return read_any_poses(Path(poses), site.machine)
+    return poses
+
+
+def session_report(outcome: Outcome) -> SessionReport:
+    """What a finished session answers."""
+    said = {
+        "format": "pkm-session/1",
+        "session": str(outcome.folder),
+        "run": str(outcome.run_folder),
+        "readings": outcome.readings,
+    }
+    return SessionReport.of(said)

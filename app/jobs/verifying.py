@@ -1,0 +1,127 @@
+"""Measure the error that is left, over a grid of poses."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+from app.files.pose_table import Pose
+from app.files.site import Site
+from app.files.text import read_text
+from app.jobs.chosen_runs import File
+from app.jobs.measuring import read_if_file
+from app.jobs.record import Record, Report
+from app.session import Session
+from app.session.station import Station
+from app.verification import FORMAT, REFERENCE_EVERY, judge_session, verification_plan
+from calib.errors import BadInput
+from calib.poses import verification_poses
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorsEntry(Record):
+    """Errors over all poses: norm of the position error, um; rotation angle, deg."""
+
+    position_peak_um: float
+    position_std_um: float
+    position_rms_um: float
+    orientation_peak_deg: float
+    orientation_std_deg: float
+    orientation_rms_deg: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class PeaksEntry(Record):
+    """Largest errors over all poses."""
+
+    position_peak_um: float
+    orientation_peak_deg: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class PoseErrorEntry(Record):
+    """Error of one pose in base axes: (3,) um and (3,) deg."""
+
+    pose: str
+    position_um: tuple[float, ...]
+    rotation_deg: tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BeforeEntry(Record):
+    """The same of an earlier verification."""
+
+    measured: ErrorsEntry
+    truth: ErrorsEntry | None
+    noise_alone: PeaksEntry
+
+
+@dataclass(frozen=True, kw_only=True)
+class VerificationReport(Report):
+    """How far the machine is from where it was sent (``pkm-verification/1``).
+
+    ``noise_alone``: the peaks that a perfect machine would show; ``truth``: on a mock, where asked
+    for; ``paper``: Han et al. 2020, Table 6.
+    """
+
+    FORMAT: ClassVar[str] = FORMAT
+    poses: int
+    measured: ErrorsEntry
+    noise_alone: PeaksEntry
+    truth: ErrorsEntry | None
+    paper: PeaksEntry
+    errors: tuple[PoseErrorEntry, ...]
+    session: str
+    before: BeforeEntry | None
+
+    def save(self, file: File) -> None:
+        """Keep the answer, for ``before=`` and the report."""
+        Path(file).write_text(json.dumps(self.to_json(), indent=1), encoding="utf-8")
+
+
+def begin_verifying(
+    site: Site,
+    poses: File | Mapping[str, Pose] | None = None,
+    *,
+    folder: Path,
+    truth: bool = False,
+    reference_every: int = REFERENCE_EVERY,
+    station: Station | None = None,
+    unattended: bool,
+) -> Session:
+    """Make a session that visits poses, the verification grid if None; raises BadInput."""
+    chosen = verification_poses(site.machine).by_label if poses is None else poses
+    plan = verification_plan(
+        site, read_if_file(chosen, site), truth=truth, reference_every=reference_every
+    )
+    return Session.create(site, plan, folder, station=station, unattended=unattended)
+
+
+def verification_report(
+    session: File, before: Mapping[str, Any] | None = None
+) -> VerificationReport:
+    """Judge a finished session from its folder, beside an earlier verification.
+
+    Raises
+    ------
+    BadInput
+        Where too little was read.
+    """
+    said = judge_session(Path(session)).to_json()
+    said["session"] = str(session)
+    said["before"] = before and {k: before[k] for k in ("measured", "truth", "noise_alone")}
+    return VerificationReport.of(said)
+
+
+def read_before(path: Path) -> dict[str, Any]:
+    """Read an earlier verification; raises BadInput if the file holds none."""
+    try:
+        data: dict[str, Any] = json.loads(read_text(path))
+        if data["format"] != FORMAT or "measured" not in data:
+            raise ValueError("another format")
+    except (ValueError, KeyError, TypeError) as error:
+        raise BadInput(
+            f"not a saved verification ({error})", place=str(path), remedy="pkmcal verify --save"
+        ) from error
+    return data

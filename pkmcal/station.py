@@ -1,0 +1,359 @@
+"""A station for scripts and notebooks: every call returns when its job is done."""
+
+import asyncio
+import threading
+from collections.abc import Callable, Coroutine, Mapping
+from concurrent import futures
+from types import TracebackType
+from typing import Any, Self, TypeVar
+
+from app.files.pose_table import Pose
+from app.files.site import Site
+from app.jobs.applying import AcceptReport, ApplyReport, SetsReport, UndoReport
+from app.jobs.chosen_runs import File
+from app.jobs.measuring import SessionReport
+from app.jobs.verifying import VerificationReport
+from app.session.events import Event
+from app.verification import REFERENCE_EVERY
+from pkmcal.async_station import AsyncStation, Operator, Order
+
+_Answer = TypeVar("_Answer")
+_LOOK_S = 0.2
+"""How often a waiting call looks whether the user interrupted it."""
+
+
+class Station:
+    """One site's controller and tracker, for scripts: measure, verify, write back, undo.
+
+    The devices are connected by :meth:`connect`, or by the first job, and stay connected until
+    :meth:`close`; ``with`` does both. The event loop is the station's own, in a thread of its own,
+    so that it works in a notebook too. Ctrl-C stops all motion first; the call then ends with
+    :class:`StoppedByOperator`, and :meth:`resume` goes on.
+
+    Parameters
+    ----------
+    site : path
+        Site file: addresses, nests, who carries SMRs.
+    folder : path
+        Where sessions get their folders.
+    operator : callable, optional
+        Stands for the person at the machine: called with a question and the possible answers,
+        returns one of them when it is so ("Put the SMR into nest 4 ...", ("done", "stop")). It may
+        take its time: it runs in a thread of its own. Without, nobody answers: questions get
+        their default answers, and where a person is indispensable the job ends with a DeviceError
+        that says so. A mock's SMRs are carried by the mock.
+    watch : callable, optional
+        Told every event of the jobs (``app.session.events``) in the station's own thread; it must
+        return at once.
+
+    Raises
+    ------
+    BadInput
+        If the site file cannot be read.
+
+    Examples
+    --------
+    >>> with pkmcal.Station("site.toml") as station:                         # doctest: +SKIP
+    ...     measured = station.measure("poses.toml")
+    ...     found = pkmcal.fit(measured.run)
+    ...     found.save("model.toml")
+    ...     done = station.apply("model.toml", yes=True)
+    ...     print(station.verify().measured.position_peak_um)
+    """
+
+    def __init__(
+        self,
+        site: File,
+        *,
+        folder: File = "sessions",
+        operator: Operator | None = None,
+        watch: Callable[[Event], None] | None = None,
+    ) -> None:
+        self._station = AsyncStation(site, folder=folder, operator=operator, watch=watch)
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._thread: threading.Thread | None = None
+
+    @property
+    def site(self) -> Site:
+        """The site file, checked."""
+        return self._station.site
+
+    def __enter__(self) -> Self:
+        try:
+            self.connect()
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def connect(self) -> None:
+        """Own the machine and connect to both devices.
+
+        Raises
+        ------
+        GateRefused
+            If another process owns the machine.
+        DeviceError
+            If a device does not answer, or is not the one that the site file names.
+        """
+        self._wait(self._station.connect())
+
+    def close(self) -> None:
+        """Let go of the devices and of the machine."""
+        loop, thread = self._loop, self._thread
+        if loop is None or thread is None:
+            return
+        try:
+            self._wait(self._station.close())
+        finally:
+            loop.call_soon_threadsafe(loop.stop)
+            thread.join()
+            loop.close()
+            self._loop = self._thread = None
+
+    def stop(self) -> None:
+        """Stop all motion now, from another thread; the job under way ends: StoppedByOperator."""
+        self._wait(self._station.stop())
+
+    def measure(
+        self,
+        poses: File | Mapping[str, Pose],
+        *,
+        order: Order | None = None,
+        reference_every: int = 10,
+        cycles: int = 1,
+        warm_up: bool = True,
+        title: str = "",
+    ) -> SessionReport:
+        """Visit all poses with an SMR in each nest and write the readings as a run.
+
+        Parameters
+        ----------
+        poses : path or mapping
+            A poses file, or label -> x, y, z (mm), rx, ry, rz (rad): the platform in the base
+            frame, in this order.
+        order : "nest-by-nest" or "pose-by-pose", optional
+            One SMR carried from nest to nest, or SMRs in all nests; by the SMRs at hand if None.
+        reference_every : int
+            Poses between two looks at the base nests.
+        cycles : int
+            How many times all poses are visited.
+        warm_up : bool
+            Wait until temperatures are steady.
+        title : str
+            Title of the run.
+
+        Returns
+        -------
+        SessionReport
+            ``run`` is the folder of the run.
+
+        Raises
+        ------
+        BadInput
+            For poses that cannot be read.
+        DeviceError
+            On a fault; the machine was brought to a stop, and :meth:`resume` goes on.
+        GateRefused
+            If a safety gate says no, a path that passes a limit for example.
+        StoppedByOperator
+            After Ctrl-C, :meth:`stop`, or where the operator said so.
+        """
+        return self._wait(
+            self._station.measure(
+                poses,
+                order=order,
+                reference_every=reference_every,
+                cycles=cycles,
+                warm_up=warm_up,
+                title=title,
+            )
+        )
+
+    def resume(self, session: File | None = None) -> SessionReport:
+        """Go on where a session was; the latest in ``folder`` if None.
+
+        Returns
+        -------
+        SessionReport
+
+        Raises
+        ------
+        BadInput
+            If there is no session.
+        DeviceError, GateRefused, StoppedByOperator
+            As :meth:`measure`.
+        """
+        return self._wait(self._station.resume(session))
+
+    def verify(
+        self,
+        poses: File | Mapping[str, Pose] | None = None,
+        *,
+        truth: bool = False,
+        reference_every: int = REFERENCE_EVERY,
+        before: File | VerificationReport | None = None,
+    ) -> VerificationReport:
+        """Send the machine over a grid, measure where it goes, and say how far off it is.
+
+        Parameters
+        ----------
+        poses : path or mapping, optional
+            As for :meth:`measure`; 27 nodes with 8 orientations each if None.
+        truth : bool
+            Also ask a mock for the noise-free truth.
+        reference_every : int
+            Poses between two looks at the base nests.
+        before : path or VerificationReport, optional
+            An earlier verification, to stand beside this one.
+
+        Returns
+        -------
+        VerificationReport
+            Errors in um and deg, base frame.
+
+        Raises
+        ------
+        BadInput, DeviceError, GateRefused, StoppedByOperator
+            As :meth:`measure`.
+        """
+        return self._wait(
+            self._station.verify(poses, truth=truth, reference_every=reference_every, before=before)
+        )
+
+    def propose(self, fit: File, *, limits: Mapping[str, float] | None = None) -> ApplyReport:
+        """Compare a saved fit with the controller and ask the gates; nothing is written.
+
+        Parameters
+        ----------
+        fit : path
+            A model file (``found.save(...)``).
+        limits : mapping, optional
+            Other limits of gates, by name.
+
+        Returns
+        -------
+        ApplyReport
+            ``written`` is False.
+
+        Raises
+        ------
+        BadInput
+            If the fit cannot be read or is of another machine.
+        GateRefused
+            Naming every gate that did not pass.
+        DeviceError
+            If the controller does not hold what is known of it.
+        """
+        return self._wait(self._station.propose(fit, limits=limits))
+
+    def apply(
+        self, fit: File, *, yes: bool = False, limits: Mapping[str, float] | None = None
+    ) -> ApplyReport:
+        """Write a saved fit to the controller: gates, trial, check poses, and only then keep.
+
+        A snapshot is taken first. Any failure brings it back.
+
+        Parameters
+        ----------
+        fit : path
+            A model file (``found.save(...)``).
+        yes : bool
+            Keep what passes every gate. If False the operator is asked, ("keep", "put back").
+        limits : mapping, optional
+            Other limits of gates, by name, knowingly.
+
+        Returns
+        -------
+        ApplyReport
+            ``snapshot`` is what :meth:`undo` takes.
+
+        Raises
+        ------
+        BadInput
+            If the fit cannot be read, or neither ``yes`` nor an operator is there.
+        GateRefused
+            If a gate or the operator said no; the earlier set is back.
+        DeviceError
+            If something broke; the message says whether the earlier set is back.
+        StoppedByOperator
+            If the operator stopped; the earlier set is back.
+        """
+        return self._wait(self._station.apply(fit, yes=yes, limits=limits))
+
+    def undo(self, to: int | None = None) -> UndoReport:
+        """Bring a parameter set back to the controller, for good.
+
+        Parameters
+        ----------
+        to : int, optional
+            Its number; the one before the last :meth:`apply` if None.
+
+        Returns
+        -------
+        UndoReport
+
+        Raises
+        ------
+        BadInput
+            If there is no such set.
+        DeviceError
+            If it does not read back: the parameters are then unknown, and motion is blocked.
+        """
+        return self._wait(self._station.undo(to))
+
+    def accept(self) -> AcceptReport:
+        """Take what the controller holds as known; nothing is written.
+
+        Returns
+        -------
+        AcceptReport
+
+        Raises
+        ------
+        DeviceError
+            If its parameters cannot be read.
+        """
+        return self._wait(self._station.accept())
+
+    def sets(self) -> SetsReport:
+        """The parameter sets of this controller that this program knows of.
+
+        Returns
+        -------
+        SetsReport
+
+        Raises
+        ------
+        DeviceError
+            If the controller does not answer.
+        """
+        return self._wait(self._station.sets())
+
+    def _wait(self, job: Coroutine[Any, Any, _Answer]) -> _Answer:
+        """Do a job in the station's loop and wait; an interrupt stops the machine first."""
+        loop = self._started()
+        doing = asyncio.run_coroutine_threadsafe(job, loop)
+        while not doing.done():
+            try:
+                futures.wait([doing], timeout=_LOOK_S)
+            except KeyboardInterrupt:
+                asyncio.run_coroutine_threadsafe(self._station.stop(), loop)
+        return doing.result()
+
+    def _started(self) -> asyncio.AbstractEventLoop:
+        if self._loop is None:
+            self._loop = asyncio.new_event_loop()
+            self._thread = threading.Thread(
+                target=self._loop.run_forever, daemon=True, name="station"
+            )
+            self._thread.start()
+        return self._loop

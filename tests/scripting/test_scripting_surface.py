@@ -1,0 +1,153 @@
+"""What scripts rely on: names, signatures and how light the import is. Change it deliberately."""
+
+import ast
+import inspect
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+import pkmcal
+
+SIGNATURES = {
+    "choose_poses": "machine=None, n=29, *, site=None, criterion='I', priors=True, sigma_um=None, "
+    "angle_mdeg=None, candidates=2500, seed=1",
+    "compare": "runs, *, add=(), model=None, propose=None, watch=None",
+    "design": "runs, discriminate, n=10, *, add=(), model=None, candidates=250, seed=1, watch=None",
+    "diagnose": "runs, *, add=(), model=None, watch=None",
+    "discover": "runs, *, add=(), model=None, watch=None",
+    "fit": "runs, *, add=(), model=None",
+    "load_machine": "name_or_path, relative_to=None",
+    "load_runs": "runs",
+    "mock_station": "machine='hexapod', *, seed=1, scale=600.0, effects=None, folder=None",
+    "simulate": "machine, run, *, seed=1, poses=60, noise_um=None, effects=None, hidden=None, "
+    "truth=None, parameters=None, controller=None, cycles=1, order='nest-by-nest', payload=(), "
+    "rise=6.0, delays=False, strays=0, title=''",
+    "verification_grid": "machine=None, *, site=None",
+}
+JOBS = {
+    "accept": "self",
+    "apply": "self, fit, *, yes=False, limits=None",
+    "close": "self",
+    "connect": "self",
+    "measure": "self, poses, *, order=None, reference_every=10, cycles=1, warm_up=True, title=''",
+    "propose": "self, fit, *, limits=None",
+    "resume": "self, session=None",
+    "sets": "self",
+    "stop": "self",
+    "undo": "self, to=None",
+    "verify": "self, poses=None, *, truth=False, reference_every=40, before=None",
+}
+MADE = "site, *, folder='sessions', operator=None, watch=None"
+FIELDS = {
+    "AcceptReport": "accepted",
+    "ApplyReport": "written changes left_out snapshot kept check_before check_after noise_peak_um",
+    "CompareReport": "effects readings rms_um noise_floor_um chi2_per_dof repeatability "
+    "reference_repeatability structure together actuators worst_poses bad_readings advice proposed",
+    "DiagnosisReport": "baseline adequate candidates indistinguishable unexplained bad_readings "
+    "unavailable advice",
+    "DiscoveryReport": "steps effects adequate indistinguishable unexplained bad_readings "
+    "parameters refused advice",
+    "FitReport": "effects readings chi2_per_dof rms_um noise_floor_um holdout_rms_um "
+    "holdout_floor_um parameters unidentified unidentified_words bad_readings left_out_readings "
+    "channels_left_aside remarks",
+    "FollowUpReport": "machine discriminate model runs conditions right_now right_then poses "
+    "advice",
+    "GridReport": "machine workspace_scale box poses",
+    "PosesReport": "machine criterion readings tolerances_as_priors candidates seed predicted "
+    "random_poses by_count path_in_strokes poses",
+    "SessionReport": "session run readings",
+    "SetsReport": "sets unknown",
+    "SimulationReport": "machine run truth seed poses readings hidden",
+    "UndoReport": "restored",
+    "VerificationReport": "poses measured noise_alone truth paper errors session before",
+}
+ERRORS = {"BadInput", "DeviceError", "GateRefused", "NameTaken", "StoppedByOperator"}
+
+
+def plainly(function: object) -> str:
+    """A signature without its types."""
+    signature = inspect.signature(function)  # type: ignore[arg-type]
+    bare = [p.replace(annotation=p.empty) for p in signature.parameters.values()]
+    return str(signature.replace(parameters=bare, return_annotation=signature.empty))[1:-1]
+
+
+def test_the_names_are_these() -> None:
+    assert set(pkmcal.__all__) == {*SIGNATURES, *FIELDS, *ERRORS, "Station", "AsyncStation"}
+    assert sorted(pkmcal.__all__) == list(pkmcal.__all__)
+    assert dir(pkmcal) == list(pkmcal.__all__)
+
+
+def test_every_name_has_a_home_that_type_checkers_see() -> None:
+    tree = ast.parse(Path(pkmcal.__file__).read_text("utf-8"))
+    imported = {
+        alias.asname: node.module
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+        if alias.asname
+    }
+    assert imported == pkmcal._HOMES
+    assert (Path(pkmcal.__file__).parent / "py.typed").exists()
+
+
+@pytest.mark.parametrize("name", SIGNATURES)
+def test_functions_are_called_like_this(name: str) -> None:
+    assert plainly(getattr(pkmcal, name)) == SIGNATURES[name]
+
+
+@pytest.mark.parametrize("name", JOBS)
+def test_a_station_is_called_like_this(name: str) -> None:
+    assert plainly(getattr(pkmcal.Station, name)) == JOBS[name]
+    assert plainly(getattr(pkmcal.AsyncStation, name)) == JOBS[name]
+
+
+def test_a_station_is_made_like_this() -> None:
+    assert plainly(pkmcal.Station) == plainly(pkmcal.AsyncStation) == MADE
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_reports_have_these_fields(name: str) -> None:
+    record = getattr(pkmcal, name)
+    assert [f.name for f in fields(record) if f.name[0] != "_"] == FIELDS[name].split()
+    assert record.FORMAT.startswith("pkm-")
+
+
+@pytest.mark.parametrize("name", [n for n in SIGNATURES if n != "load_machine"])
+def test_every_function_is_documented_with_an_example(name: str) -> None:
+    text = inspect.getdoc(getattr(pkmcal, name)) or ""
+    for part in ("Parameters\n---", "Raises\n---", "Examples\n---"):
+        assert part in text
+    for parameter in inspect.signature(getattr(pkmcal, name)).parameters:
+        assert f"{parameter} :" in text or f"{parameter}, " in text or f", {parameter}" in text
+
+
+@pytest.mark.parametrize("name", [n for n in JOBS if n not in ("close", "stop")])
+def test_every_job_of_a_station_says_what_it_raises(name: str) -> None:
+    text = inspect.getdoc(getattr(pkmcal.Station, name)) or ""
+    assert "Raises\n---" in text
+
+
+def test_unknown_names_are_missing_like_anywhere() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'fitt'"):
+        pkmcal.fitt  # noqa: B018
+
+
+def test_the_import_is_light() -> None:
+    code = (
+        "import sys, pkmcal; heavy = {'numpy', 'click', 'app', 'calib'} & set(sys.modules);"
+        "assert not heavy, heavy; pkmcal.BadInput; assert 'numpy' not in sys.modules"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_no_function_needs_the_screens_or_the_command_line() -> None:
+    code = (
+        "import sys, pkmcal; [getattr(pkmcal, name) for name in pkmcal.__all__];"
+        "seen = {'textual', 'click', 'matplotlib'} & set(sys.modules); assert not seen, seen"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
