@@ -110,6 +110,10 @@ class TomlTable:
         """Every key, in the order of the file."""
         return list(self._data)
 
+    def as_it_stands(self) -> dict[str, Any]:
+        """The whole table as TOML has it; nothing in it is asked for."""
+        return dict(self._data)
+
     def raw(self, key: str, kind: str = "any", *, required: bool = False) -> Any:
         """A value as it stands; None where it is missing."""
         return self._get(key, Asked(kind, "", required, None), f"{key} = ...")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from app.files.pose_table import Pose, read_poses
+from app.files.pose_table import HOME, Pose, read_poses
 from app.files.text import read_text
 from calib.arrays import Array
 from calib.mechanism.description import Machine
@@ -93,6 +93,8 @@ def pose_file_of(top: TomlTable, source: str, machine: Machine) -> PoseFile:
         raise top.wrong(
             "there is no pose", "poses", remedy='Write p01 = { x = 1.0, ..., rx = "2 deg" }'
         )
+    if HOME in labels:
+        raise poses.wrong(f'no pose can be called "{HOME}"', HOME, remedy="Rename it")
     task = np.array([_coordinates(poses, label, machine) for label in labels]).T
     pose_set = solve_poses(machine, task)
     _check_reach(pose_set, labels, poses)

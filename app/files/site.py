@@ -153,7 +153,7 @@ def site_of(top: TomlTable, source: str, folder: Path) -> Site:
 
 def _standing_alone(top: TomlTable, machine_name: str, folder: Path) -> dict[str, Any]:
     """The file's tables, with a path of the machine file that holds from everywhere."""
-    data = {name: top.raw(name) for name in top}
+    data = top.as_it_stands()
     if machine_name.endswith(".toml"):
         data["machine"] = str((folder / machine_name).resolve())
     return data
