@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from app import answer
+from app.show.trait_words import trait_data, trait_words
 from calib.analysis.inspection import Inspection
 from calib.mechanism.description import Machine
 from calib.mechanism.variants import closure_names
@@ -45,6 +46,7 @@ def inspection_data(found: Inspection, grid: VerificationGrid) -> dict[str, Any]
         "verification_box": grid.box,
         "verification_scale": grid.scale,
         "closures": closure_names(machine),
+        **trait_data(machine),
     }
 
 
@@ -61,6 +63,7 @@ def inspection_words(found: Inspection, grid: VerificationGrid) -> str:
         _singularity(found),
         _reach(found, grid),
         _limits(found),
+        trait_words(machine),
     ]
     return "\n\n".join(part for part in parts if part)
 

@@ -50,6 +50,8 @@ def words(report: dict[str, Any]) -> str:
     lines += [*bad_lines(report), "", report["advice"]]
     for name, why in report["unavailable"].items():
         lines.append(f"(not asked: {name}, {why})")
+    if lacking := report["not_on_this_machine"]:
+        lines.append(f"(not on this machine: {', '.join(lacking)}; pkmcal machine check says why)")
     return "\n".join(lines)
 
 

@@ -9,6 +9,7 @@ from scipy import stats
 from calib.discover.agreement import TOGETHER_WORSE, runs_at_odds, untrue_uncertainties
 from calib.discover.diagnosis import RunDiagnosis
 from calib.discover.discovery import stage_of
+from calib.effects import not_defined
 from calib.evidence.findings import Diagnosis, Finding
 from calib.evidence.forward import Discovery
 from calib.identify.fitting import Fit
@@ -34,6 +35,7 @@ def diagnosis_report(found: RunDiagnosis) -> dict[str, Any]:
         "unexplained": _unexplained(diagnosis),
         "bad_readings": bad_readings(found.fit),
         "unavailable": found.unavailable,
+        "not_on_this_machine": not_defined(found.fit.model.machine),
         "advice": advice(found),
     }
 

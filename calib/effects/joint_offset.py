@@ -7,18 +7,15 @@ and L_P once the directions are known. n_B is the direction of D - B in the plan
 joint's first axis, n_P that of C - P (Han et al. 2020; docs/papers.md).
 """
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from calib.arrays import Array
 from calib.effects.component import Effect, Signature, Situation
-from calib.effects.legs import Leg, arm_between, leg_of
+from calib.effects.legs import Leg, LegJoint, leg_joints, why_no_joints
 from calib.effects.lengthened import Change, lengthened
 from calib.effects.limb_frames import frames_along, limb_labels, place_on_platform
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import rotate
-from calib.mechanism.traits import UniversalJoint
 from calib.runs.stack import Rows
 from calib.unknown import Unknown
 
@@ -35,54 +32,45 @@ class JointOffset(Effect):
 
     def lacking(self, machine: Machine) -> str:
         """Legs must stand on universal joints whose axes meet in the file."""
-        if list(_joints(machine)):
-            return ""
-        if any(limb.traits.base_joint or limb.traits.platform_joint for limb in machine.limbs):
-            return "its file knows how far the axes of its universal joints are apart"
-        return "its file names no leg on a universal joint (traits base_joint, platform_joint)"
+        return "" if _joints(machine) else why_no_joints(machine, arm=False)
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``joint-offset.leg1.L_B``, ``.L_P`` ..., mm."""
         labels = limb_labels(rows.machine)
         return tuple(
-            Unknown(f"joint-offset.{labels[leg.limb]}.{ARMS[body]}", "mm", 5.0)
-            for leg, body, _ in _joints(rows.machine)
+            Unknown(f"joint-offset.{labels[one.leg.limb]}.{ARMS[one.body]}", "mm", 5.0)
+            for one in _joints(rows.machine)
         )
 
     def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
         """Each leg alone."""
-        limbs = [leg.limb for leg, _, _ in _joints(rows.machine)]
+        limbs = [one.leg.limb for one in _joints(rows.machine)]
         return tuple(
             tuple(k for k, own in enumerate(limbs) if own == limb) for limb in dict.fromkeys(limbs)
         )
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """Difference of the legs' lengths, per arm."""
-        joints = list(_joints(situation.machine))
+        joints = _joints(situation.machine)
         changes = []
-        for limb in dict.fromkeys(leg.limb for leg, _, _ in joints):
-            own = {body: k for k, (leg, body, _) in enumerate(joints) if leg.limb == limb}
-            leg = joints[next(iter(own.values()))][0]
+        for leg in dict.fromkeys(one.leg for one in joints):
+            own = {one.body: k for k, one in enumerate(joints) if one.leg == leg}
             shapes = _shapes(situation, leg, {body: float(values[k]) for body, k in own.items()})
             for body, k in own.items():
-                changes.append(Change(k, limb, leg.length, leg.sense * shapes[body]))
+                changes.append(Change(k, leg.limb, leg.length, leg.sense * shapes[body]))
         return lengthened(situation, changes, len(joints), closed_anew=True)
 
 
-def _joints(machine: Machine) -> Iterator[tuple[Leg, str, UniversalJoint]]:
-    """Legs, and those universal joints at their ends whose axes meet."""
-    for number, limb in enumerate(machine.limbs):
-        leg = leg_of(machine, number)
-        for body, joint in (("base", limb.traits.base_joint),
-                            ("platform", limb.traits.platform_joint)):  # fmt: skip
-            if leg is not None and joint is not None and not arm_between(machine, limb, joint):
-                yield leg, body, joint
+def _joints(machine: Machine) -> list[LegJoint]:
+    """Universal joints of legs whose axes meet."""
+    return [one for one in leg_joints(machine) if one.square and not one.arm]
 
 
 def _shapes(situation: Situation, leg: Leg, arms: dict[str, float]) -> dict[str, Array]:
     """How much longer (N,) the file's leg is per mm of each arm, for arms of these lengths."""
     limb = situation.machine.limbs[leg.limb]
-    frames, traits = frames_along(situation, limb), limb.traits
+    frames = frames_along(situation.machine, limb, situation.rows.extension, situation.passive)
+    traits = limb.traits
     base, platform = traits.base_joint, traits.platform_joint
     B = frames[leg.foot if base is None else base.first][0]
     joint = leg.head if platform is None else platform.first

@@ -7,18 +7,15 @@ e x (C - B), which acts like an extension +u . (e x (C - B)); on the platform it
 like -u . (e x (D - P)). Where the axes meet, C = B: a tilt moves nothing at all.
 """
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from calib.arrays import Array
 from calib.effects.component import Effect, Signature, Situation, alone
-from calib.effects.legs import Leg, arm_between, leg_of
+from calib.effects.legs import LegJoint, leg_joints, why_no_joints
 from calib.effects.lengthened import Change, lengthened
-from calib.effects.limb_frames import frames_along, limb_labels, turn_about
+from calib.effects.limb_frames import frames_along, limb_labels
 from calib.mechanism.description import Machine
-from calib.mechanism.rigid import cross, product
-from calib.mechanism.traits import UniversalJoint
+from calib.mechanism.rigid import cross
 from calib.runs.stack import Rows
 from calib.unknown import Unknown
 
@@ -34,75 +31,51 @@ class JointTilt(Effect):
 
     def lacking(self, machine: Machine) -> str:
         """Legs must stand on universal joints with an arm between their axes."""
-        if list(_joints(machine)):
-            return ""
-        if any(limb.traits.base_joint or limb.traits.platform_joint for limb in machine.limbs):
-            return "the axes of its universal joints meet: a tilt of the first moves nothing"
-        return "its file names no leg on a universal joint (traits base_joint, platform_joint)"
+        return "" if _joints(machine) else why_no_joints(machine, arm=True)
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``joint-tilt.leg1.base.y`` ..., rad."""
-        machine = rows.machine
-        labels = limb_labels(machine)
-        return tuple(
-            Unknown(
-                f"joint-tilt.{labels[leg.limb]}.{body}.{'xyz'[axis]}",
-                "rad", SIGMA_RAD, sigma=SIGMA_RAD,
-            )
-            for leg, body, joint in _joints(machine)
-            for axis in _tilting(machine, leg, joint)
-        )  # fmt: skip
+        labels = limb_labels(rows.machine)
+        names = [
+            f"joint-tilt.{labels[one.leg.limb]}.{one.body}.{'xyz'[axis]}"
+            for one in _joints(rows.machine)
+            for axis in _tilting(rows.machine, one)
+        ]
+        return tuple(Unknown(name, "rad", SIGMA_RAD, sigma=SIGMA_RAD) for name in names)
 
     def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
         """Each joint alone."""
-        return alone(len(list(_joints(rows.machine))), 2)
+        return alone(len(_joints(rows.machine)), 2)
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """Motion of the arm's end along the leg."""
-        machine = situation.machine
-        joints = list(_joints(machine))
+        machine, joints = situation.machine, _joints(situation.machine)
         changes = []
-        for number, (leg, body, joint) in enumerate(joints):
-            limb = machine.limbs[leg.limb]
-            frames = frames_along(situation, limb)
+        for number, one in enumerate(joints):
+            leg, limb = one.leg, machine.limbs[one.leg.limb]
+            frames = frames_along(machine, limb, situation.rows.extension, situation.passive)
             along = frames[leg.head][0] - frames[leg.foot][0]
             along = along / np.sqrt(np.sum(along**2, axis=0))
-            place, axes = frames[joint.first]
-            sign = 1.0 if body == "base" else -1.0
-            if body == "platform":
-                axes = _after(situation, leg, joint, axes)
-            arm = frames[joint.second][0] - place
-            for k, axis in enumerate(_tilting(machine, leg, joint)):
+            place, axes = frames[one.joint.first]
+            sign = leg.sense
+            if one.body == "platform":
+                axes, sign = frames[one.joint.first + 1][1], -sign
+            arm = frames[one.joint.second][0] - place
+            for k, axis in enumerate(_tilting(machine, one)):
                 moved = np.sum(along * cross(axes[:, axis], arm), axis=0)
-                changes.append(
-                    Change(2 * number + k, leg.limb, leg.length, leg.sense * sign * moved)
-                )
+                changes.append(Change(2 * number + k, leg.limb, leg.length, sign * moved))
         return lengthened(situation, changes, 2 * len(joints))
 
 
-def _joints(machine: Machine) -> Iterator[tuple[Leg, str, UniversalJoint]]:
-    """Legs, and those universal joints at their ends that have an arm."""
-    for number, limb in enumerate(machine.limbs):
-        leg = leg_of(machine, number)
-        for body, joint in (("base", limb.traits.base_joint),
-                            ("platform", limb.traits.platform_joint)):  # fmt: skip
-            if leg is not None and joint is not None and arm_between(machine, limb, joint):
-                yield leg, body, joint
+def _joints(machine: Machine) -> list[LegJoint]:
+    """Universal joints of legs that have an arm."""
+    return [one for one in leg_joints(machine) if one.square and one.arm]
 
 
-def _tilting(machine: Machine, leg: Leg, joint: UniversalJoint) -> tuple[int, int]:
+def _tilting(machine: Machine, one: LegJoint) -> tuple[int, int]:
     """The two local axes of a joint's frame beside its first axis."""
-    axis = machine.limbs[leg.limb].elements[joint.first].axis
+    axis = machine.limbs[one.leg.limb].elements[one.joint.first].axis
     return (axis + 1) % 3, (axis + 2) % 3
-
-
-def _after(situation: Situation, leg: Leg, joint: UniversalJoint, axes: Array) -> Array:
-    """Axes (3, 3, N) of the platform joint's frame: those after its own turn."""
-    element = situation.machine.limbs[leg.limb].elements[joint.first]
-    angle = np.full(situation.rows.count, element.constant)
-    for term in element.terms:
-        angle = angle + term.factor * situation.passive[term.index]
-    return product(axes, turn_about(element.axis, angle))
 
 
 EFFECTS = (JointTilt(),)

@@ -1,10 +1,17 @@
 """Legs between two joints: which element of the chain is the leg, and where its ends are."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
-from calib.effects.limb_frames import nominal_value
+import numpy as np
+
+from calib.effects.limb_frames import frames_along, nominal_value
 from calib.mechanism.description import Limb, Machine
+from calib.mechanism.solve import home_configuration
 from calib.mechanism.traits import UniversalJoint
+
+SQUARE = 1e-6
+"""Cosine (of the arm: mm) up to which two directions stand square on each other."""
 
 
 @dataclass(frozen=True)
@@ -20,6 +27,59 @@ class Leg:
     sense: float
     foot: int
     head: int
+
+
+@dataclass(frozen=True)
+class LegJoint:
+    """A universal joint at the ``base`` or at the ``platform`` end of a leg.
+
+    ``square``: at home the second axis stands square on the first, on the arm and on the leg, so
+    that leg and first axis lie in one plane; ``arm``: the file puts the axes apart.
+    """
+
+    leg: Leg
+    body: str
+    joint: UniversalJoint
+    arm: bool
+    square: bool
+
+
+@lru_cache(maxsize=64)
+def leg_joints(machine: Machine) -> tuple[LegJoint, ...]:
+    """Every universal joint of every leg, base before platform; cached by the machine."""
+    found = []
+    for number, limb in enumerate(machine.limbs):
+        leg = leg_of(machine, number)
+        for body, joint in (
+            ("base", limb.traits.base_joint),
+            ("platform", limb.traits.platform_joint),
+        ):
+            if leg is not None and joint is not None:
+                arm = bool(arm_between(machine, limb, joint))
+                found.append(LegJoint(leg, body, joint, arm, _square(machine, leg, joint)))
+    return tuple(found)
+
+
+def why_no_joints(machine: Machine, *, arm: bool) -> str:
+    """Why no universal joint of a leg is of this kind, for :meth:`Effect.lacking`."""
+    joints = leg_joints(machine)
+    if not joints:
+        return "its file names no leg on a universal joint (traits base_joint, platform_joint)"
+    if any(one.arm == arm for one in joints):
+        return "its legs do not stand square on the axes of their universal joints"
+    if arm:
+        return "the axes of its universal joints meet: a tilt of the first moves nothing"
+    return "its file knows how far the axes of its universal joints are apart"
+
+
+def _square(machine: Machine, leg: Leg, joint: UniversalJoint) -> bool:
+    limb, home = machine.limbs[leg.limb], home_configuration(machine)
+    frames = frames_along(machine, limb, home.extension, home.passive)
+    first, second = (frames[k][1][:, limb.elements[k].axis, 0] for k in (joint.first, joint.second))
+    along = frames[leg.head][0][:, 0] - frames[leg.foot][0][:, 0]
+    arm = frames[joint.second][0][:, 0] - frames[joint.first][0][:, 0]
+    parts = [abs(second @ first), abs(second @ along) / np.linalg.norm(along), abs(second @ arm)]
+    return bool(max(parts) < SQUARE)
 
 
 def leg_of(machine: Machine, number: int) -> Leg | None:

@@ -5,7 +5,6 @@ from collections import Counter
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Situation
 from calib.mechanism.description import Limb, Machine
 from calib.mechanism.rigid import product, rotate
 
@@ -34,26 +33,27 @@ def nominal_value(machine: Machine, limb: Limb, element: int) -> float:
     )
 
 
-def frames_along(situation: Situation, limb: Limb) -> list[Placed]:
+def frames_along(machine: Machine, limb: Limb, extension: Array, passive: Array) -> list[Placed]:
     """Frame before each element of a limb, and the last; base axes, nominal parameters.
 
-    That of a joint is the frame in which it turns: before its own turn.
+    That of a joint is the frame in which it turns: before its own turn. ``extension`` (n, N),
+    ``passive`` (n_joints, N).
     """
-    machine, rows = situation.machine, situation.rows
-    origin = np.zeros((3, rows.count))
-    axes = np.repeat(np.eye(3)[:, :, None], rows.count, axis=2)
+    count = extension.shape[1]
+    origin = np.zeros((3, count))
+    axes = np.repeat(np.eye(3)[:, :, None], count, axis=2)
     found = [(origin, axes)]
     for index, element in enumerate(limb.elements):
-        value = np.full(rows.count, nominal_value(machine, limb, index))
+        value = np.full(count, nominal_value(machine, limb, index))
         for term in element.terms:
             if term.kind == "actuator":
-                value = value + term.factor * rows.extension[term.index]
+                value = value + term.factor * extension[term.index]
             elif term.kind == "passive":
-                value = value + term.factor * situation.passive[term.index]
+                value = value + term.factor * passive[term.index]
         if element.turns:
             axes = product(axes, turn_about(element.axis, value))
         else:
-            shift = np.zeros((3, rows.count))
+            shift = np.zeros((3, count))
             shift[element.axis] = value
             origin = origin + rotate(axes, shift)
         found.append((origin, axes))
