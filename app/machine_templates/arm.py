@@ -51,10 +51,14 @@ def arm_file(name: str, ask: Questions) -> str:
 # Add an error wherever your arm may have one: rx:skew1 behind an axis, tz:a3 between two.
 [limbs.arm]
 chain = \"\"\"
-Rz:q1 tz:{base:g} tx:a1
+Rz:q1 column=tz:{base:g} tx:a1
 Ry:q2+zero2 tz:a2
 Ry:q3+zero3 tx:d4
-Rx:q4+zero4 Ry:q5+zero5 Rx:q6 tx:{flange:g}
-\"\"\"""",
+Rx:q4+zero4 Ry:q5+zero5 Rx:q6 flange=tx:{flange:g}
+\"\"\"
+
+# What the parts are: these are links, they grow when the arm is warm.
+[limbs.arm.traits]
+grows = ["column", "a1", "a2", "d4", "flange"]""",
         "\n".join(["[limbs.arm.parameters]", *parameters]),
     )

@@ -70,9 +70,14 @@ zero = "tower{k}.zero\""""
 [limb_types.rod]
 chain = \"\"\"
 rz:azimuth tx:radius Tz:q+zero ty:side
-Uxy(0,{lean:.2f}d) tz:-length ball=Sxyz(0,{-lean:.2f}d)
+hook=Uxy(0,{lean:.2f}d) tz:-length ball=Sxyz(0,{-lean:.2f}d)
 ty:-side tx:-{effector:g} rz:-corner
 \"\"\"
+
+# What the parts are: a rod that grows when it is warm, on a universal joint.
+[limb_types.rod.traits]
+grows = ["length"]
+base_joint = "hook"
 
 [limb_types.rod.parameters]
 length = {{ unit = "mm", tolerance = {tolerance:g}, nominal = {rod:g} }}""",

@@ -57,7 +57,14 @@ rz = ["-12 deg", "12 deg"]
         f"""# To the base joint; lean about x, then about y; the leg; the ball joint; back to the
 # platform's origin. Small letters are fixed, capitals are joints; Sxyz spells a ball joint.
 [limb_types.leg]
-chain = "tx:B_x ty:B_y tz:B_z Uxy Tz:q+L0 ball=Sxyz tx:-P_x ty:-P_y tz:-P_z"
+chain = "tx:B_x ty:B_y tz:B_z foot=Uxy Tz:q+L0 ball=Sxyz tx:-P_x ty:-P_y tz:-P_z"
+
+# What the parts are: a leg that grows when it is warm, on a universal joint. A leg that is a screw
+# without a guide, under a second universal joint: turn=Rz head=Uxy in place of the ball joint, then
+# platform_joint = "head" and screw = "turn".
+[limb_types.leg.traits]
+grows = ["L0"]
+base_joint = "foot"
 
 # Everything that a calibration may find, with the tolerance of its manufacture (+-).
 [limb_types.leg.parameters]

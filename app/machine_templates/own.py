@@ -68,6 +68,14 @@ def own_file(name: str, ask: Questions) -> str:
         f"""# To the limb's place on the base, its joints, and back to the platform's origin.
 [limb_types.limb]
 chain = "rz:place tx:base {chain} tx:-top rz:-place\"""",
+        *(
+            [
+                "# What the parts are: limbs that grow when they are warm.\n"
+                '[limb_types.limb.traits]\ngrows = ["L0"]'
+            ]
+            if length
+            else []
+        ),
         "\n".join(["[limb_types.limb.parameters]", *parameters]),
         *(
             f'[limbs.limb{k}]\ntype = "limb"\nq = "q{k}"\nplace = "{360.0 * (k - 1) / count:g} deg"'

@@ -307,7 +307,7 @@ class Closure:
         A machine whose limbs are not redundant carries no wrench: nothing yields.
         """
         if limb.triangle is None:
-            return np.zeros((0, *twist.shape[1:])), None
+            return np.zeros((len(limb.group.compliant), *twist.shape[1:])), None
         along = np.einsum("irln,iln->rln", limb.wrenches, twist)
         wrench = backward_substitution(limb.triangle, forward_substitution(limb.triangle, along))
         force = np.einsum("irln,rln->iln", limb.wrenches, wrench)

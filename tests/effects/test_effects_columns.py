@@ -24,8 +24,10 @@ def test_columns_agree_with_differences(name: str, identifier: str) -> None:
     model = Model(rows, [effect])
     unknowns, trials = model.unknowns[0], list(effect.trials(rows))
     generator = np.random.default_rng(7)
-    # Small amplitudes: an effect's shape moves with the pose that it moves.
-    small = [0.01 * u.size * generator.normal() for u in unknowns]
+    # Small amplitudes, since an effect's shape moves with the pose that it moves; but a period or
+    # a time constant can only be seen where there is something to be seen.
+    share = 1.0 if any(u.nonlinear for u in unknowns) else 0.01
+    small = [share * u.size * generator.normal() for u in unknowns]
     trial = iter(trials[len(trials) // 3])
     values = [next(trial) if u.nonlinear else v for u, v in zip(unknowns, small, strict=True)]
     linear = model.linearise(start_of(model, np.array(values)))
@@ -33,7 +35,8 @@ def test_columns_agree_with_differences(name: str, identifier: str) -> None:
         if unknown.nonlinear and identifier in ("frame-shift", "redundancy"):
             continue  # a moment, a limb: searched, never differentiated
         step = np.zeros(model.prior.size)
-        step[model.free.size + index] = size = 1e-6 if unknown.nonlinear else 1e-3 * unknown.size
+        size = 1e-5 * values[index] if unknown.nonlinear else 1e-3 * unknown.size
+        step[model.free.size + index] = size
         ahead, back = (
             model.predict(model.moved(linear.state, sign * step)) for sign in (1.0, -1.0)
         )
