@@ -92,9 +92,10 @@ class EncoderCyclic(ScrewCyclic):
     id = "encoder-cyclic"
     says = "each rotary actuator errs once per turn: eccentric encoder or gear"
 
-    def applies(self, machine: Machine) -> bool:
-        """Where linear and rotary actuators are mixed."""
-        return len(units_of(machine.axes)) > 1
+    def lacking(self, machine: Machine) -> str:
+        """Linear and rotary actuators must be mixed."""
+        mixed = len(units_of(machine.axes)) > 1
+        return "" if mixed else "its actuators are of one kind: screw-cyclic is theirs"
 
     def axes(self, machine: Machine) -> IntArray:
         """The rotary actuators, by index."""
