@@ -1,11 +1,10 @@
 """The azimuth of a platform joint is not the one that belongs to its limb."""
 
-import numpy as np
-
 from calib.arrays import Array
 from calib.effects.component import Effect, Signature, Situation, alone
-from calib.effects.lengthened import Change, lengthened
+from calib.effects.lengthened import by_limb, limbs_with
 from calib.mechanism.description import Machine
+from calib.mechanism.traits import Part, Traits
 from calib.runs.stack import Rows
 from calib.unknown import Unknown
 
@@ -40,18 +39,16 @@ class JointAzimuth(Effect):
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """Turn of the joint's frame on the platform, in every chain of the limb."""
-        names, count = _limbs(situation.machine), situation.rows.count
-        changes = [
-            Change(names.index(limb.name), number, part.element, np.full(count, part.factor))
-            for number, limb in enumerate(situation.machine.limbs)
-            for part in limb.traits.platform_azimuth
-        ]
-        return lengthened(situation, changes, len(names))
+        return by_limb(situation, _azimuth)
 
 
 def _limbs(machine: Machine) -> list[str]:
     """Limbs whose platform joint stands at an azimuth."""
-    return list(dict.fromkeys(b.name for b in machine.limbs if b.traits.platform_azimuth))
+    return limbs_with(machine, _azimuth)
+
+
+def _azimuth(traits: Traits) -> tuple[Part, ...]:
+    return traits.platform_azimuth
 
 
 EFFECTS = (JointAzimuth(),)

@@ -1,6 +1,6 @@
 """Parts of a limb that are longer or turned: what that does, driven or not."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +8,10 @@ import numpy as np
 from calib.arrays import Array
 from calib.effects.component import Signature, Situation
 from calib.mechanism.description import Element, Machine, Term
+from calib.mechanism.traits import Part, Traits
+
+PartsOf = Callable[[Traits], tuple[Part, ...]]
+"""Which parts of a limb, by its traits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +63,23 @@ def lengthened(
         parameters=parameters if parameters is not None and np.any(parameters) else None,
         twist=twist if fixed else None,
     )
+
+
+def limbs_with(machine: Machine, parts_of: PartsOf) -> list[str]:
+    """Names of the limbs that have such parts; the chains of one limb share its name."""
+    return list(dict.fromkeys(limb.name for limb in machine.limbs if parts_of(limb.traits)))
+
+
+def by_limb(situation: Situation, parts_of: PartsOf) -> Signature:
+    """One unknown for each of :func:`limbs_with`: these parts of all its chains change together."""
+    machine, count = situation.machine, situation.rows.count
+    names = limbs_with(machine, parts_of)
+    changes = [
+        Change(names.index(limb.name), number, part.element, np.full(count, part.factor))
+        for number, limb in enumerate(machine.limbs)
+        for part in parts_of(limb.traits)
+    ]
+    return lengthened(situation, changes, len(names))
 
 
 def own_parameter(machine: Machine, element: Element) -> Term | None:

@@ -4,12 +4,11 @@ A difference acts through the closure as it is, elastic where the machine is ove
 (Feng et al. 2022).
 """
 
-import numpy as np
-
 from calib.arrays import Array
 from calib.effects.component import Effect, Signature, Situation, alone
-from calib.effects.lengthened import Change, lengthened
+from calib.effects.lengthened import by_limb, limbs_with
 from calib.mechanism.description import Machine
+from calib.mechanism.traits import Part, Traits
 from calib.runs.stack import Rows
 from calib.unknown import Unknown
 
@@ -43,18 +42,16 @@ class ParallelogramSides(Effect):
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """Half a difference longer on one side, half shorter on the other."""
-        names, count = _limbs(situation.machine), situation.rows.count
-        changes = [
-            Change(names.index(limb.name), number, side.element, np.full(count, side.factor))
-            for number, limb in enumerate(situation.machine.limbs)
-            for side in limb.traits.sides
-        ]
-        return lengthened(situation, changes, len(names))
+        return by_limb(situation, _sides)
 
 
 def _limbs(machine: Machine) -> list[str]:
     """Limbs that are parallelograms."""
-    return list(dict.fromkeys(limb.name for limb in machine.limbs if limb.traits.sides))
+    return limbs_with(machine, _sides)
+
+
+def _sides(traits: Traits) -> tuple[Part, ...]:
+    return traits.sides
 
 
 def _own_parameters(machine: Machine, name: str) -> list[str]:
