@@ -25,9 +25,13 @@ class JointTilt(HiddenEffect):
         return of_names(names, rng)
 
     def example(self, site: Site) -> Table:
-        """One joint at the base, one on the platform."""
-        one, two = site.limbs[1], site.limbs[-1]
-        return {f"joint-tilt.{one}.base.y": 2e-3, f"joint-tilt.{two}.platform.z": -2e-3}
+        """Both axes of a joint at the base, and of one on the platform, each on another leg."""
+        axes = ("base.y", "base.z", "platform.y", "platform.z")
+        sizes = (2e-3, -1e-3, 1e-3, -2e-3)
+        return {
+            f"joint-tilt.{limb}.{axis}": size
+            for limb, axis, size in zip(site.limbs, axes, sizes, strict=False)
+        }
 
 
 EFFECTS = (JointTilt(),)
