@@ -1,5 +1,6 @@
 """The command line: one verb for each of the operator's tasks, loaded only when it is asked for."""
 
+import io
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -16,7 +17,7 @@ VERBS = Path(__file__).parent / "verbs"
 # The order in which an operator works; it is the order of ``pkmcal --help``.
 TASKS = (
     ("Know the machine", ("machine", "poses", "design", "sensitivity", "identifiability")),
-    ("Measure", ("measure", "resume")),
+    ("Measure", ("site", "measure", "resume")),
     ("Identify", ("fit", "compare")),
     ("Find what the model misses", ("diagnose", "discover")),
     ("Correct and prove it", ("apply", "undo", "verify", "iso9283", "report")),
@@ -101,6 +102,9 @@ def pkmcal(context: click.Context, site: Path | None, folder: Path) -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and end the process with the exit code of how the job ended."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a code page without a sign ends no answer
     sys.exit(run(arguments))
 
 

@@ -53,6 +53,19 @@ class ControllerState:
     channels: Mapping[str, float] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class ControllerCan:
+    """What a controller offers; routines ask before they rely on it.
+
+    ``parameters``: it holds kinematic parameters that can be read, written and stored. ``homes``:
+    its actuators have reference moves. ``channels``: names of its state readings.
+    """
+
+    parameters: bool = True
+    homes: bool = True
+    channels: tuple[str, ...] = ()
+
+
 class MotionController(Protocol):
     """A controller that holds kinematic parameters and moves the machine with them.
 
@@ -61,6 +74,7 @@ class MotionController(Protocol):
     """
 
     identity: Identity
+    can: ControllerCan
 
     def on_alarm(self, callback: Callable[[Alarm], None]) -> None:
         """Call ``callback`` in the event loop for everything said unasked."""
@@ -83,18 +97,12 @@ class MotionController(Protocol):
     async def home(self, actuator: str) -> None:
         """Run one actuator's homing."""
 
-    async def jog(self, actuator: str, q: float) -> None:
-        """Move one actuator alone to ``q`` and wait until it is there."""
-
     async def move_to_pose(self, pose: tuple[float, ...]) -> tuple[float, ...]:
-        """Command a pose and start moving: x, y, z in mm; alpha, beta, gamma in rad.
+        """Command a pose and start moving: x, y, z in mm; rx, ry, rz in rad.
 
-        R = Rz(gamma) Ry(beta) Rx(alpha). Returns the actuator targets q that the controller
+        R = Rz(rz) Ry(ry) Rx(rx). Returns the actuator targets q that the controller
         computed with the parameters that it holds. Raises Refused if outside its limits.
         """
-
-    async def move_to_q(self, q: tuple[float, ...]) -> None:
-        """Command all actuators together and start moving."""
 
     async def wait_arrived(self, timeout: float) -> None:
         """Wait until every drive reports its target reached; ``timeout`` in wall seconds."""
@@ -128,14 +136,15 @@ class MotionController(Protocol):
 class TrackerReading:
     """The mean of one dwell: SMR centre in the tracker frame (mm), with its uncertainty.
 
-    ``covariance`` holds xx, yy, zz, xy, xz, yz of the mean in mm^2.
+    ``covariance`` holds xx, yy, zz, xy, xz, yz of the mean in mm^2. The weather (deg C, hPa,
+    relative humidity in %) is None where the tracker has no station for it.
     """
 
     xyz: tuple[float, float, float]
     covariance: tuple[float, float, float, float, float, float]
-    temperature_C: float
-    pressure_hPa: float
-    humidity: float
+    temperature_C: float | None = None
+    pressure_hPa: float | None = None
+    humidity: float | None = None
 
 
 @dataclass(frozen=True)
@@ -149,7 +158,7 @@ class TrackSample:
 
 @dataclass(frozen=True)
 class TrackerState:
-    """What the tracker says of itself."""
+    """What the tracker says of itself; ``face`` is 0 where it has no two faces."""
 
     initialized: bool
     ready: bool
@@ -159,10 +168,32 @@ class TrackerState:
     face: int
 
 
+@dataclass(frozen=True)
+class TrackerCan:
+    """What a tracker offers; routines ask before they rely on it, and say what was not done.
+
+    ``points``: it drives its beam to a place. ``searches``: it looks for a lost reflector.
+    ``faces``: it has two, and changes them. ``streams``: it has a continuous mode. ``reflectors``:
+    the type of reflector is chosen by name. ``weather``, ``object_temperature``: it measures them.
+    """
+
+    points: bool = False
+    searches: bool = False
+    faces: bool = False
+    streams: bool = False
+    reflectors: bool = False
+    weather: bool = False
+    object_temperature: bool = False
+
+
 class Tracker(Protocol):
-    """A laser tracker that follows an SMR."""
+    """A laser tracker that follows an SMR.
+
+    What ``can`` denies is never called; it may raise Refused.
+    """
 
     identity: Identity
+    can: TrackerCan
 
     def on_alarm(self, callback: Callable[[Alarm], None]) -> None:
         """Call ``callback`` in the event loop for everything said unasked."""
@@ -176,9 +207,6 @@ class Tracker(Protocol):
     async def initialize(self) -> None:
         """Set units (mm, rad, deg C, hPa), right-handed xyz, environment; initialise if needed."""
 
-    async def reflectors(self) -> dict[str, int]:
-        """Name and identifier of every reflector that the tracker knows."""
-
     async def select_reflector(self, name: str) -> None:
         """Choose the reflector type; raises Refused if the tracker does not know it."""
 
@@ -188,9 +216,6 @@ class Tracker(Protocol):
     async def find_reflector(self, distance_mm: float) -> None:
         """Search around the present direction; raises NoTarget."""
 
-    async def go_birdbath(self) -> None:
-        """Drive the beam to the home reflector."""
-
     async def measure(self, dwell_s: float) -> TrackerReading:
         """Measure stationary for ``dwell_s`` of device time; raises BeamBroken, NotReady."""
 
@@ -198,7 +223,10 @@ class Tracker(Protocol):
         """Yield continuous-mode samples until the iterator is closed; raises BeamBroken."""
 
     async def channels(self) -> dict[str, float]:
-        """Object temperature (``structure_temp_C``) and meteo (``air_temp_C``, ...)."""
+        """What it measures of object temperature (``structure_temp_C``) and air.
+
+        ``air_temp_C``, ``pressure_hPa``, ``humidity``; what has no sensor has no channel.
+        """
 
     async def change_face(self) -> None:
         """Turn to the other face, for the two-face check."""

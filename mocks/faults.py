@@ -23,6 +23,9 @@ Names, with what reads them:
 ``tracker-not-initialised``             one-shot: the tracker forgets that it was initialised
 ``tracker-cold``                        the laser is heating; measurements answer NotWarmedUp
 ``tracker-unstable``                    measurements answer NotStable
+``tracker-no-object-sensor``            no sensor of the object's temperature is connected
+``tracker-no-weather-station``          no weather station is connected
+``tracker-lost``                        a tracker that sends lines has lost its SMR
 ``tracker-silent``                      the tracker answers nothing
 ``tracker-no-result``                   StartMeasurement is answered, the result never comes
 ``tracker-result-unstable``             the result comes with status NoStationaryResult

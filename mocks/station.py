@@ -35,12 +35,14 @@ from mocks.hidden.table import Hidden
 from mocks.physics.bodies import BODIES
 from mocks.physics.truth import draw_parameters, machine_file, read_parameters
 from mocks.tracker.instrument import SERIAL
+from mocks.tracker.lines import LineServer
 from mocks.tracker.server import TrackerServer
 from mocks.world import World, WorldPlan
 
 CONTROLLER_NODE = 10
 ON_GCS = ("tripod",)
 """Machines whose controller speaks GCS; the others are on CANopen."""
+LINES_SIGMA_MM = 0.006
 FRAME_ERROR_MM, FRAME_ERROR_RAD = 3.0, 0.003
 
 
@@ -54,6 +56,7 @@ class MockStation:
         nvm: Path | None = None,
         ports: tuple[int, int, int] = (0, 0, 0),
         serial: int | None = None,
+        lines: bool = False,
     ) -> None:
         self.world = world
         self.clock = clock
@@ -65,17 +68,22 @@ class MockStation:
             else CanopenStation(world, nvm, host, ports[0], self.serial)
         )
         self.tracker = TrackerServer(world, clock, host, ports[1])
+        self.lines = LineServer(world, clock, host) if lines else None
         self.control = ControlServer(Hands(world, self.tracker, self.controller), host, ports[2])
 
     async def start(self) -> None:
         """Power on."""
         await asyncio.to_thread(self.controller.start)
         await self.tracker.start()
+        if self.lines is not None:
+            await self.lines.start()
         await self.control.start()
 
     async def stop(self) -> None:
         """Power off."""
         await self.control.stop()
+        if self.lines is not None:
+            await self.lines.stop()
         await self.tracker.stop()
         await asyncio.to_thread(self.controller.stop)
 
@@ -112,6 +120,16 @@ class MockStation:
             "node": CONTROLLER_NODE,
         }  # fmt: skip
 
+    def _tracker_site(self) -> dict[str, Any]:
+        if self.lines is not None:
+            return {
+                "kind": "line-stream", "address": self.lines.address, "sigma_mm": LINES_SIGMA_MM,
+            }  # fmt: skip
+        return {
+            "kind": "emscon", "address": self.tracker.address, "serial": str(SERIAL),
+            "model": "AT901-LR", "reflector": "CCR-1.5in",
+        }  # fmt: skip
+
     def site(self) -> dict[str, Any]:
         """A site file for this station, without its ``format``."""
         plan, around, load = self.world.plan, self.world.around, self.world.load
@@ -119,10 +137,7 @@ class MockStation:
             "title": f"mock {self.world.machine.name}, seed {plan.seed}",
             "machine": self.world.machine.name,
             "controller": {**self._controller_site(), "serial": str(self.serial)},
-            "tracker": {
-                "kind": "emscon", "address": self.tracker.address, "serial": str(SERIAL),
-                "model": "AT901-LR", "reflector": "CCR-1.5in", "frame": self._rough_frame(),
-            },
+            "tracker": {**self._tracker_site(), "frame": self._rough_frame()},
             "nests": {
                 "platform": {k: list(v) for k, v in around.platform_nests.items()},
                 "base": {k: list(v) for k, v in around.base_nests.items()},
@@ -180,6 +195,10 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("--serial", type=int, help="of the controller; else one for each --nvm")
     parser.add_argument("--smrs", type=int, choices=[1, 3], default=1)
     parser.add_argument("--no-base-smrs", action="store_true", help="base nests are empty")
+    parser.add_argument(
+        "--lines", action="store_true",
+        help="the tracker only sends x y z lines (the driver of examples/line_tracker)",
+    )  # fmt: skip
     parser.add_argument("--payload", type=float, default=0.0, help="kg")
     for name in ("controller", "tracker", "control"):
         parser.add_argument(f"--{name}-port", type=int, default=0)
@@ -209,7 +228,7 @@ def build(options: argparse.Namespace) -> MockStation:
     world = World(clock, plan)
     world.payload_kg = options.payload
     ports = (options.controller_port, options.tracker_port, options.control_port)
-    return MockStation(world, clock, options.nvm, ports, options.serial)
+    return MockStation(world, clock, options.nvm, ports, options.serial, options.lines)
 
 
 async def run(options: argparse.Namespace) -> None:

@@ -47,7 +47,7 @@ def write_model(path: Path, fit: Fit) -> None:
     correlation = fit.covariance / (sigma[:, None] * sigma)
     table: dict[str, Any] = {
         "format": MODEL_FORMAT,
-        "machine": fit.model.rows.runs[0].header.machine,
+        "machine": fit.model.machine.name,
         "runs": [run.source for run in fit.model.rows.runs],
         "effects": report["effects"],
         "compensation": compensation_of(fit),

@@ -11,6 +11,8 @@ from typing import Any
 
 import tomli_w
 
+from app.devices import kind_named, kind_names
+from app.files.device_settings import read_address, read_settings
 from app.files.machines import load_machine
 from app.files.text import read_text
 from calib.errors import BadInput
@@ -24,25 +26,29 @@ FARTHEST_MM = 1e9
 
 @dataclass(frozen=True)
 class ControllerSite:
-    """Where the motion controller is; ``settings`` holds what only its kind of link needs."""
+    """Which motion controller it is; ``settings`` holds what its kind declares.
+
+    ``address`` names this very one: its channel or port.
+    """
 
     kind: str
     serial: str
     settings: Mapping[str, Any]
+    address: str
 
 
 @dataclass(frozen=True)
 class TrackerSite:
-    """Where the tracker is, and roughly how it stands.
+    """Which tracker it is, and roughly how it stands; ``settings`` are those of its kind.
 
     ``frame`` is the base frame in the tracker frame (x, y, z mm; rx, ry, rz rad) and
     ``frame_radius_mm`` how wrong a point computed with it may be.
     """
 
     kind: str
-    host: str
-    port: int
     serial: str
+    settings: Mapping[str, Any]
+    address: str
     model: str
     reflector: str
     frame: tuple[float, ...]
@@ -136,8 +142,8 @@ def site_of(top: TomlTable, source: str, folder: Path) -> Site:
         title=top.text("title", ""),
         machine_name=machine_name,
         machine=machine,
-        controller=_controller(top.table("controller"), len(machine.actuators)),
-        tracker=_tracker(top.table("tracker")),
+        controller=_controller(top.table("controller"), len(machine.actuators), folder),
+        tracker=_tracker(top.table("tracker"), len(machine.actuators), folder),
         platform_nests={name: _centre(platform, name) for name in platform},
         base_nests={name: _centre(base, name) for name in base},
         load=_load(top),
@@ -176,47 +182,25 @@ def _check_nests(site: Site, base: TomlTable) -> None:
         raise base.wrong(f'nest "{name}" is on both', name, remedy="Give every nest its own name")
 
 
-def _controller(table: TomlTable, actuators: int) -> ControllerSite:
-    kind = table.choice("kind", ["canopen", "gcs"])
-    serial = table.text("serial", "")
-    settings = _gcs(table, actuators) if kind == "gcs" else _canopen(table)
+def _controller(table: TomlTable, actuators: int, folder: Path) -> ControllerSite:
+    name = table.choice("kind", kind_names("controller"))
+    kind = kind_named("controller", name)
+    settings = read_settings(table, kind, actuators, folder)
+    site = ControllerSite(name, table.text("serial", ""), settings, kind.address(settings))
     table.end()
-    return ControllerSite(kind, serial, settings)
+    return site
 
 
-def _canopen(table: TomlTable) -> dict[str, Any]:
-    return {
-        "interface": table.text("interface", "slcan"),
-        "channel": table.text("channel"),
-        "bitrate": table.whole("bitrate", 0),
-        "controller_node": table.whole("node", 10, least=1),
-    }
-
-
-def _gcs(table: TomlTable, actuators: int) -> dict[str, Any]:
-    axes = table.text("axes", "A B C").split()
-    if len(axes) != actuators:
-        raise table.wrong(
-            f"{len(axes)} axes, {actuators} actuators", "axes", remedy="Name one axis an actuator"
-        )
-    return {
-        "channel": table.text("port"),
-        "baudrate": table.whole("baudrate", 115200, least=300),
-        "axes": axes,
-        "pose_axes": table.text("pose_axes", "X Y Z").split(),
-        "level_password": table.text("level_password", "advanced"),
-        "store_password": table.text("store_password", "100"),
-    }
-
-
-def _tracker(table: TomlTable) -> TrackerSite:
-    host, port = _address(table, "address", 700)
+def _tracker(table: TomlTable, actuators: int, folder: Path) -> TrackerSite:
+    name = table.choice("kind", kind_names("tracker"))
+    kind = kind_named("tracker", name)
+    settings = read_settings(table, kind, actuators, folder)
     site = TrackerSite(
-        kind=table.choice("kind", ["emscon"]),
-        host=host,
-        port=port,
+        kind=name,
         serial=table.text("serial", ""),
-        model=table.text("model", "AT901-LR"),
+        settings=settings,
+        address=kind.address(settings),
+        model=table.text("model", "AT901-LR" if name == "emscon" else name),
         reflector=table.text("reflector", ""),
         frame=table.numbers("frame", 6, unit="mm, rad", most=FARTHEST_MM),
         frame_radius_mm=table.number("frame_radius_mm", 20.0, unit="mm", above=0.0, most=math.inf),
@@ -227,7 +211,7 @@ def _tracker(table: TomlTable) -> TrackerSite:
 
 def _hands(table: TomlTable) -> Hands:
     kind = table.choice("kind", ["operator", "mock"], "operator")
-    host, port = _address(table, "control", 0) if kind == "mock" else ("", 0)
+    host, port = read_address(table, "control", 0) if kind == "mock" else ("", 0)
     hands = Hands(kind, host, port, table.whole("smrs", 1, least=1), table.flag("base_smrs", True))
     table.end()
     return hands
@@ -269,16 +253,6 @@ def _load(top: TomlTable) -> Load | None:
     load = load_of(table)
     table.end()
     return load
-
-
-def _address(table: TomlTable, key: str, default_port: int) -> tuple[str, int]:
-    text = table.text(key)
-    host, colon, port = text.rpartition(":")
-    if not colon and default_port:
-        return text, default_port
-    if not host or not port.isdigit() or not 0 < int(port) < 65536:
-        raise table.wrong(f'{key} is "{text}"', key, remedy='Write "host:port"')
-    return host, int(port)
 
 
 def site_of_mock(announcement: Mapping[str, Any]) -> Site:

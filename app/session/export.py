@@ -7,6 +7,7 @@ import numpy as np
 
 from app.files.runs import write_run
 from app.files.site import Site
+from app.files.text import read_text
 from app.session.journal import PARAMETERS, Journal, Row
 from app.session.plan import Plan
 from calib.arrays import Array
@@ -18,6 +19,8 @@ DIGITS = Digits(
 )  # fmt: skip
 """A tenth of a nanometre, far below what a tracker tells."""
 
+MACHINE = "machine.toml"
+"""A lab's own machine file goes with the run, so that the run can be read elsewhere."""
 _SAME = 1e-9
 _NOTHING = (np.nan,) * 6
 
@@ -30,6 +33,9 @@ def export_run(site: Site, plan: Plan, journal: Journal, folder: Path) -> Path:
     approach depends on it.
     """
     header = _header(site, plan, journal.meta(PARAMETERS, {}))
+    if header.machine == MACHINE:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / MACHINE).write_text(read_text(Path(site.machine.source)), encoding="utf-8")
     run = run_of(journal.rows(), header, len(site.machine.actuators))
     write_run(folder, run, DIGITS, replace=True)
     return folder
@@ -38,7 +44,7 @@ def export_run(site: Site, plan: Plan, journal: Journal, folder: Path) -> Path:
 def _header(site: Site, plan: Plan, held: Mapping[str, float]) -> Header:
     known = site.machine.parameter_index
     return Header(
-        machine=site.machine_name,
+        machine=MACHINE if site.machine_name.endswith(".toml") else site.machine_name,
         title=plan.title,
         tracker={"model": site.tracker.model, "reflector": site.tracker.reflector},
         platform_nests={name: np.array(place) for name, place in site.platform_nests.items()},

@@ -1,45 +1,34 @@
-"""Which driver speaks to which kind of device of the site file."""
+"""Opens the devices of a site, whatever kinds they are."""
 
+from typing import cast
+
+from app.devices import kind_named
 from app.files.site import Site
-from drivers.canopen.controller import CanopenController
-from drivers.emscon.tracker import EmsconTracker
-from drivers.gcs.axes import Axes
-from drivers.gcs.controller import GcsController
 from drivers.interface import MotionController, Tracker
+from drivers.kind import ActuatorFacts, Surroundings
 
 
 async def open_controller(site: Site) -> MotionController:
     """Connect to the site's motion controller; raises a DeviceError if it does not answer."""
-    if site.controller.kind == "gcs":
-        return await _open_gcs(site)
-    settings = site.controller.settings
-    return await CanopenController.connect(
-        settings["interface"],
-        settings["channel"],
-        settings["bitrate"] or None,
-        machine=site.machine.name,
-        node_id=settings["controller_node"],
-        serial=site.controller.serial or None,
-        limits={a.name: a.limits for a in site.machine.actuators},
-    )
-
-
-async def _open_gcs(site: Site) -> MotionController:
-    settings = site.controller.settings
-    names = [actuator.name for actuator in site.machine.actuators]
-    return await GcsController.connect(
-        settings["channel"],
-        settings["baudrate"],
-        axes=Axes(dict(zip(names, settings["axes"], strict=True)), settings["pose_axes"]),
-        serial=site.controller.serial or None,
-        limits={a.name: a.limits for a in site.machine.actuators},
-        level=f"CCL 1 {settings['level_password']}",
-        store_password=settings["store_password"],
-    )
+    kind = kind_named("controller", site.controller.kind)
+    return cast(MotionController, await kind.open(_around(site, "controller")))
 
 
 async def open_tracker(site: Site) -> Tracker:
     """Connect to the site's tracker; raises a DeviceError if it does not answer."""
-    return await EmsconTracker.connect(
-        f"{site.tracker.host}:{site.tracker.port}", time_scale=site.clock_scale
+    kind = kind_named("tracker", site.tracker.kind)
+    return cast(Tracker, await kind.open(_around(site, "tracker")))
+
+
+def _around(site: Site, role: str) -> Surroundings:
+    machine = site.machine
+    own = site.controller if role == "controller" else site.tracker
+    return Surroundings(
+        settings=own.settings,
+        serial=own.serial,
+        machine=machine.name,
+        actuators=tuple(ActuatorFacts(a.name, a.unit, a.home, a.limits) for a in machine.actuators),
+        parameters={parameter.name: parameter.nominal for parameter in machine.parameters},
+        time_scale=site.clock_scale,
+        description=machine,
     )

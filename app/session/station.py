@@ -99,8 +99,8 @@ class Station:
         controller.on_alarm(self._alarm)
         tracker.on_alarm(self._alarm)
         addresses = {
-            "controller": str(self.site.controller.settings.get("channel", "")),
-            "tracker": f"{self.site.tracker.host}:{self.site.tracker.port}",
+            "controller": self.site.controller.address,
+            "tracker": self.site.tracker.address,
         }
         for role, identity in (
             ("controller", controller.identity),
@@ -192,5 +192,4 @@ class Station:
 
 def _machine_key(site: Site) -> str:
     """What names the machine for the lock: its controller's address."""
-    settings = site.controller.settings
-    return f"{site.machine.name} at {settings.get('channel', site.controller.kind)}"
+    return f"{site.machine.name} at {site.controller.address}"

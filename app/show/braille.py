@@ -6,6 +6,7 @@ import numpy as np
 
 from calib.arrays import Array
 
+_SHADES = " .:-=+*##"
 _DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
 
 
@@ -54,6 +55,20 @@ class Canvas:
                 cells.append(chr(0x2800 + code))
             out.append("".join(cells))
         return out
+
+
+def plain(text: str, encoding: str | None) -> str:
+    """A drawing for a terminal or file that has no such characters: the more dots, the darker."""
+    try:
+        text.encode(encoding or "utf-8")
+    except UnicodeEncodeError:
+        return "".join(_shade(character) for character in text)
+    return text
+
+
+def _shade(character: str) -> str:
+    dots = ord(character) - 0x2800
+    return _SHADES[dots.bit_count()] if 0 <= dots <= 0xFF else character
 
 
 def beside(left: Sequence[str], right: Sequence[str], gap: str = "  ") -> str:

@@ -1,6 +1,7 @@
 """Describe a machine, check what its file says, draw it"""
 
 import shutil
+import sys
 from pathlib import Path
 
 import click
@@ -10,6 +11,7 @@ from app import answer
 from app.analysis_options import chosen_machine, machine_options
 from app.files.machines import load_machine
 from app.machine_templates import TEMPLATES
+from app.show.braille import plain
 from app.show.machine_drawing import draw_figure, draw_text
 from app.show.machine_words import inspection_data, inspection_words
 from calib.analysis.inspection import inspect
@@ -63,7 +65,8 @@ def draw(machine_name: str, closure: str, pose: str, out: Path | None) -> None:
         answer.say(f"written to {out}")
         return
     size = shutil.get_terminal_size((80, 24))
-    click.echo(draw_text(shape, min(size.columns, 160), max(10, min(size.lines - 4, 40))))
+    drawing = draw_text(shape, min(size.columns, 160), max(10, min(size.lines - 4, 40)))
+    click.echo(plain(drawing, sys.stdout.encoding))
     x, y, z, *angles = np.round(configuration.poses.to_xyz_rpy()[:, 0], 6) + 0.0
     turned = ", ".join(f"{np.rad2deg(a):.2f}" for a in angles)
     click.echo(f"platform at {x:.2f}, {y:.2f}, {z:.2f} mm; rx, ry, rz {turned} deg")

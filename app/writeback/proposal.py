@@ -8,6 +8,7 @@ used while the run was taken, so the two are added: writing a fit twice writes t
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import PurePath
 
 from app.files.fits import SavedFit
 from calib.effects import effect_named
@@ -53,7 +54,7 @@ def propose(machine: Machine, fit: SavedFit, held: Mapping[str, float]) -> Propo
     BadInput
         If the fit is of another machine, or lacks a parameter of this one.
     """
-    if fit.machine and fit.machine not in (machine.name, machine.source):
+    if fit.machine and not _same_machine(fit.machine, machine):
         raise BadInput(
             f'a fit of the machine "{fit.machine}", the site has "{machine.name}"',
             place=fit.source,
@@ -85,6 +86,11 @@ def propose(machine: Machine, fit: SavedFit, held: Mapping[str, float]) -> Propo
         else:
             left_out[effect] = "the controller has no compensation for it; its error stays"
     return Proposal(tuple(changes), left_out)
+
+
+def _same_machine(said: str, machine: Machine) -> bool:
+    """Whether a model's machine is this one; older models hold the path of its file."""
+    return said == machine.name or PurePath(said).name == PurePath(machine.source).name
 
 
 def _of_the_machine(effect: str, machine: Machine) -> bool:

@@ -10,7 +10,7 @@ import struct
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from drivers.canopen import layout as at
 from drivers.canopen.drive402 import DISABLE_VOLTAGE, REFERENCED, STATUSWORD, Drive402, state_name
@@ -21,7 +21,7 @@ from drivers.canopen.machine_bus import MachineBus
 from drivers.canopen.motion import MOVE_TO_POSE, MOVE_TO_Q, PREPARE
 from drivers.canopen.parameter_access import ParameterAccess
 from drivers.errors import LinkError, Refused, Silence
-from drivers.interface import ActuatorState, Alarm, ControllerState, Identity
+from drivers.interface import ActuatorState, Alarm, ControllerCan, ControllerState, Identity
 
 T = TypeVar("T")
 ANSWER_DEADLINE_S = 2.0
@@ -37,6 +37,7 @@ class CanopenController:
 
     def __init__(self, bus: MachineBus, identity: Identity) -> None:
         self.identity = identity
+        self.can = ControllerCan(channels=tuple(bus.layout.channels))
         self.layout = bus.layout
         self._bus = bus
         self._drives = bus.drives
@@ -61,6 +62,7 @@ class CanopenController:
         limits: Mapping[str, tuple[float, float]] | None = None,
         heartbeat_s: float = 0.1,
         silence_s: float = 1.0,
+        options: Mapping[str, Any] | None = None,
     ) -> "CanopenController":
         """Open the bus, recognise the controller and watch all nodes. Nothing moves.
 
@@ -78,6 +80,8 @@ class CanopenController:
             limits must not be wider.
         silence_s : float
             Wall time without a heartbeat after which a node, or this PC, counts as lost.
+        options : mapping, optional
+            Further keywords of the interface, as python-can calls them.
 
         Raises
         ------
@@ -89,8 +93,9 @@ class CanopenController:
         path = eds or eds_path(f"{machine}_controller")
         layout = read_layout(path, node_id)
         address = BusAddress(
-            interface, channel, bitrate, heartbeat_s=heartbeat_s, silence_s=silence_s
-        )
+            interface, channel, bitrate, heartbeat_s=heartbeat_s, silence_s=silence_s,
+            more=options or {},
+        )  # fmt: skip
         link = await CanLink.open(address)
         try:
             bus = MachineBus(link, layout, node_id, path)
@@ -221,8 +226,8 @@ class CanopenController:
     async def move_to_pose(self, pose: tuple[float, ...]) -> tuple[float, ...]:
         """Command a pose and start moving; returns the controller's targets q.
 
-        In the machine's own coordinates: for the hexapod x, y, z in mm and alpha, beta, gamma in
-        rad, R = Rz(gamma) Ry(beta) Rx(alpha); for the ptm tilt and azimuth in rad. Raises Refused
+        In the machine's own coordinates: for the hexapod x, y, z in mm and rx, ry, rz in rad,
+        R = Rz(rz) Ry(ry) Rx(rx); for the ptm tilt and azimuth in rad. Raises Refused
         (limits, unreachable, not enabled) or the standing fault.
         """
         self.check()

@@ -11,9 +11,9 @@ import logging
 import socket
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -39,6 +39,10 @@ T = TypeVar("T")
 WATCH_PERIOD_S = 0.05
 BOOT_UP = 0
 SDO_DEADLINE_S = 1.0
+NO_LIBRARY = (can.CanInterfaceNotImplementedError, ImportError, NameError)
+UNKNOWN_WORDS = (TypeError, ValueError)
+CANNOT_OPEN = (can.CanError, OSError, AttributeError, *NO_LIBRARY, *UNKNOWN_WORDS)
+"""What python-can's interfaces raise when they do not open; a missing library has many faces."""
 REMEDY_LINK = "Check cable, adapter and power; then connect again. The machine stops by itself."
 
 
@@ -56,6 +60,8 @@ class BusAddress:
     pc_node: int = 127
     heartbeat_s: float = 0.1
     silence_s: float = 1.0
+    more: Mapping[str, Any] = field(default_factory=dict)
+    """Further keywords of the interface."""
 
     def options(self) -> dict[str, Any]:
         """Return the keyword arguments of ``can.Bus``."""
@@ -68,7 +74,7 @@ class BusAddress:
             options["timeout"] = 0.05
             if self.channel.startswith("socket://"):
                 options["sleep_after_open"] = 0
-        return options
+        return {**options, **self.more}
 
 
 class Device:
@@ -128,8 +134,12 @@ class CanLink:
             link.closed = True
             what = f"did not open within {timeout} s"
             raise ConnectFailed(what, device=link.name, remedy=remedy) from error
-        except (can.CanError, OSError, ValueError) as error:
+        except CANNOT_OPEN as error:
             link._workers.shutdown(wait=False)
+            if isinstance(error, UNKNOWN_WORDS):
+                remedy = "Check [controller.can] against python-can's page of this interface."
+            elif isinstance(error, NO_LIBRARY):
+                remedy = "Install the maker's driver and library, or choose another interface."
             raise ConnectFailed(str(error), device=link.name, remedy=remedy) from error
         link._watcher.start()
         return link

@@ -8,11 +8,12 @@ from drivers.errors import ProtocolError
 from drivers.interface import TrackerReading, TrackSample
 
 
-def reading(packet: wire.Packet, device: str) -> TrackerReading:
+def reading(packet: wire.Packet, device: str, *, weather: bool) -> TrackerReading:
     """The mean of one dwell, from a packet of type 2 or 9.
 
     The a-priori standard deviations are taken as the uncertainty of the mean: the statistics of
     the samples know nothing of what is slower than the dwell. Covariances come with type 9 only.
+    Without a weather station the packet's weather is what somebody typed, and is left out.
     Raises ProtocolError for numbers that are none, or uncertainties that are not positive.
     """
     xyz = (packet.real("val1"), packet.real("val2"), packet.real("val3"))
@@ -32,9 +33,9 @@ def reading(packet: wire.Packet, device: str) -> TrackerReading:
     return TrackerReading(
         xyz=xyz,
         covariance=(sigma[0] ** 2, sigma[1] ** 2, sigma[2] ** 2, mixed[0], mixed[1], mixed[2]),
-        temperature_C=packet.real("temperature"),
-        pressure_hPa=packet.real("pressure"),
-        humidity=packet.real("humidity"),
+        temperature_C=packet.real("temperature") if weather else None,
+        pressure_hPa=packet.real("pressure") if weather else None,
+        humidity=packet.real("humidity") if weather else None,
     )
 
 

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
+from dataclasses import replace
 
 from drivers.emscon import wire
 from drivers.emscon.codes import (
@@ -17,6 +18,7 @@ from drivers.emscon.codes import (
     Status,
     Temperature,
     TrackerStatus,
+    WeatherMonitor,
     status_words,
 )
 from drivers.emscon.link import EmsconLink
@@ -24,7 +26,14 @@ from drivers.emscon.measurement import Measurement, refusal
 from drivers.emscon.results import reading, samples
 from drivers.emscon.settings import EmsconSettings
 from drivers.errors import BeamBroken, DeviceError, LinkLost, NoTarget, Refused, Silence
-from drivers.interface import Alarm, Identity, TrackerReading, TrackerState, TrackSample
+from drivers.interface import (
+    Alarm,
+    Identity,
+    TrackerCan,
+    TrackerReading,
+    TrackerState,
+    TrackSample,
+)
 
 INITIALIZE_S = 90.0
 POINT_S = 60.0
@@ -52,6 +61,15 @@ class EmsconTracker:
         self._link = link
         self._scale = time_scale
         self._settings = settings or EmsconSettings()
+        self.can = TrackerCan(
+            points=True,
+            searches=True,
+            faces=True,
+            streams=True,
+            reflectors=True,
+            weather=self._settings.weather_monitor != WeatherMonitor.OFF,
+            object_temperature=self._settings.object_sensor is not False,
+        )
         self._alarms: list[Callable[[Alarm], None]] = []
         self._names: dict[int, str] = {}
         self._cached: dict[str, dict[str, wire.Value]] = {}
@@ -149,6 +167,37 @@ class EmsconTracker:
             timeout_ms=round(1000.0 * self._settings.search_timeout_s),
         )
         await self.reflectors()
+        if self.can.weather:
+            await self._require_weather()
+        if self._settings.object_sensor is None:
+            self.can = replace(self.can, object_temperature=await self._has_object_sensor())
+
+    async def _require_weather(self) -> None:
+        """Refraction is a person's decision: without a station somebody must state the air."""
+        try:
+            await self._ask("GetEnvironmentParams")
+        except Refused as error:
+            raise Refused(
+                f"it has no weather station ({error.what})",
+                device=self._link.device,
+                remedy='Connect it, or write weather = "off" and environment = [deg C, hPa, %] '
+                "under [tracker] in the site file",
+            ) from error
+
+    async def _has_object_sensor(self) -> bool:
+        """Ask for the object's temperature once; a refusal means that nothing measures it."""
+        try:
+            await self._ask("GetObjectTemperature")
+        except Refused as error:
+            self._say(
+                Alarm(
+                    self._link.device,
+                    f"no sensor of the object's temperature ({error.what})",
+                    "Connect one, or measure without: thermal growth then stays unseen.",
+                )
+            )
+            return False
+        return True
 
     async def reflectors(self) -> dict[str, int]:
         """Name and identifier of every reflector that the tracker knows."""
@@ -200,7 +249,8 @@ class EmsconTracker:
                 deadline = dwell_s / self._scale + self._settings.margin_s
                 try:
                     async with asyncio.timeout(deadline):
-                        return reading(await measurement.next(), self._link.device)
+                        packet = await measurement.next()
+                        return reading(packet, self._link.device, weather=self.can.weather)
                 except TimeoutError as error:
                     raise BeamBroken(
                         f"the result did not come within {deadline:.1f} s",
@@ -245,15 +295,17 @@ class EmsconTracker:
                 self._measurement = None
 
     async def channels(self) -> dict[str, float]:
-        """Object temperature and weather: deg C, hPa, relative humidity in %."""
-        thing = await self._ask("GetObjectTemperature")
-        air = await self._ask("GetEnvironmentParams")
-        return {
-            "structure_temp_C": thing.real("temperature"),
-            "air_temp_C": air.real("temperature"),
-            "pressure_hPa": air.real("pressure"),
-            "humidity": air.real("humidity"),
-        }
+        """What it measures of object and air: deg C, hPa, relative humidity in %."""
+        found = {}
+        if self.can.object_temperature:
+            thing = await self._ask("GetObjectTemperature")
+            found["structure_temp_C"] = thing.real("temperature")
+        if self.can.weather:
+            air = await self._ask("GetEnvironmentParams")
+            found["air_temp_C"] = air.real("temperature")
+            found["pressure_hPa"] = air.real("pressure")
+            found["humidity"] = air.real("humidity")
+        return found
 
     async def stop(self) -> None:
         """End any measurement; never raises for a second call."""

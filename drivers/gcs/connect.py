@@ -9,7 +9,7 @@ from drivers.gcs.line import Line
 from drivers.interface import Identity
 
 
-def recognise(line: Line, serial: str | None) -> tuple[Identity, Layout]:
+def recognise(line: Line, serial: str | None, groups: frozenset[str]) -> tuple[Identity, Layout]:
     """Return who answers and what it holds; raises ConnectFailed, Refused, ProtocolError."""
     try:
         line.synchronise()
@@ -29,7 +29,7 @@ def recognise(line: Line, serial: str | None) -> tuple[Identity, Layout]:
             device=line.device,
             remedy="Connect the right machine, or correct the site file.",
         )
-    return identity, read_layout(line.query("HPA?"), line.device)
+    return identity, read_layout(line.query("HPA?"), line.device, groups)
 
 
 def check_limits(line: Line, limits: Mapping[str, tuple[float, float]]) -> None:

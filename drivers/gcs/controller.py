@@ -5,18 +5,19 @@ what a controller must offer: docs/protocols/gcs.md.
 """
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from drivers.errors import DeviceError, DriveFault, Refused
 from drivers.gcs.answers import numbers
 from drivers.gcs.axes import MOVING, SERVO, TRIPOD, Axes, state_name
 from drivers.gcs.connect import check_limits, recognise
+from drivers.gcs.layout import groups_of
 from drivers.gcs.line import Line
 from drivers.gcs.link import GcsLink
 from drivers.gcs.motion import Motion
 from drivers.gcs.parameter_access import ParameterAccess
 from drivers.gcs.watch import Watch
-from drivers.interface import ActuatorState, Alarm, ControllerState, Identity
+from drivers.interface import ActuatorState, Alarm, ControllerCan, ControllerState, Identity
 
 SINGLE_MOTION_S, FAREWELL_S = 60.0, 1.5
 
@@ -33,6 +34,7 @@ class GcsController:
         self, link: GcsLink, identity: Identity, parameters: ParameterAccess, axes: Axes
     ) -> None:
         self.identity = identity
+        self.can = ControllerCan(channels=tuple(parameters.layout.channels))
         self.axes = axes
         self._link = link
         self._device = link.device
@@ -55,6 +57,7 @@ class GcsController:
         level: str = "CCL 1 advanced",
         store_password: str = "100",
         silence_s: float = 1.0,
+        parameters: Iterable[str] = (),
     ) -> "GcsController":
         """Open the line, recognise the controller and begin to watch it. Nothing moves.
 
@@ -82,7 +85,9 @@ class GcsController:
         """
         link = await GcsLink.open(port, baudrate, silence_s)
         try:
-            identity, layout = await link.call(lambda line: recognise(line, serial))
+            identity, layout = await link.call(
+                lambda line: recognise(line, serial, groups_of(parameters))
+            )
             if limits:
                 wanted = {axes.actuators[name]: pair for name, pair in limits.items()}
                 await link.call(lambda line: check_limits(line, wanted))

@@ -2,10 +2,12 @@
 
 The identifiers are this project's own (docs/protocols/gcs.md); their meaning is read from the
 controller: an entry of group ``limb`` named ``h`` with three items holds limb1.h, limb2.h and
-limb3.h; entries of group ``channel`` are state readings.
+limb3.h (``leg``, ``tower`` ...: as the machine file calls its limbs); entries of group ``channel``
+are state readings.
 """
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from drivers.errors import ProtocolError
@@ -30,8 +32,19 @@ class Layout:
     watchdog: bool
 
 
-def read_layout(lines: list[str], device: str) -> Layout:
-    """Read the answer to ``HPA?``; raises ProtocolError if it lists no kinematic parameters."""
+def groups_of(parameters: Iterable[str]) -> frozenset[str]:
+    """What a machine calls its limbs, without their numbers: {"leg"} of leg1.h, leg2.h ..."""
+    found = (re.match(r"([A-Za-z_]+)\d+\.", name) for name in parameters)
+    return frozenset(match[1] for match in found if match) or frozenset({LIMB})
+
+
+def read_layout(
+    lines: list[str], device: str, groups: frozenset[str] = frozenset({LIMB})
+) -> Layout:
+    """Read the answer to ``HPA?``; raises ProtocolError if it lists no kinematic parameters.
+
+    ``groups`` are those whose entries are kinematic parameters, one item a limb.
+    """
     parameters: dict[str, Address] = {}
     channels: dict[str, Address] = {}
     numbers = set()
@@ -42,14 +55,14 @@ def read_layout(lines: list[str], device: str) -> Layout:
         number, items = int(entry[1], 16), int(entry[3])
         group, says = entry[5].strip(), entry[6].strip()
         numbers.add(number)
-        if group == LIMB:
+        if group in groups:
             for item in range(1, items + 1):
-                parameters[f"{LIMB}{item}.{says}"] = (str(item), number)
+                parameters[f"{group}{item}.{says}"] = (str(item), number)
         elif group == CHANNEL:
             channels[says] = ("1", number)
     if not parameters or CRC_IN_USE not in numbers:
         raise ProtocolError(
-            "lists no kinematic parameters (HPA?)",
+            f"lists no kinematic parameters of a group {' or '.join(sorted(groups))} (HPA?)",
             device=device,
             remedy="Check that this is the controller of the site file, and its firmware.",
         )

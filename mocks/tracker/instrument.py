@@ -223,7 +223,9 @@ class Instrument:
             self.event(Event.READY)
 
     async def _environment(self, _: Values) -> None:
-        if self.settings["SystemSettings"]["weather_monitor"] == int(WeatherMonitor.OFF):
+        if "tracker-no-weather-station" in self.world.faults:
+            self.answer("GetEnvironmentParams", Status.NO_WEATHER_MONITOR)
+        elif self.settings["SystemSettings"]["weather_monitor"] == int(WeatherMonitor.OFF):
             self.send(wire.answer("GetEnvironmentParams", **self.settings["EnvironmentParams"]))
         else:
             self.send(wire.answer("GetEnvironmentParams", **self.weather()))
@@ -328,6 +330,9 @@ class Instrument:
         self.send(wire.answer("GetMeasurementStatusInfo", last_result=self.last_status, bits=bits))
 
     async def _object_temperature(self, _: Values) -> None:
+        if "tracker-no-object-sensor" in self.world.faults:
+            self.answer("GetObjectTemperature", Status.NO_WEATHER_MONITOR)
+            return
         kelvin_free = self.units.temperature(self.world.structure_temp_C())
         self.send(wire.answer("GetObjectTemperature", temperature=kelvin_free))
 

@@ -6,8 +6,9 @@ import zlib
 import pytest
 from gcs_bench import Bench
 
-from drivers.errors import ParameterError, Refused
+from drivers.errors import ParameterError, ProtocolError, Refused
 from drivers.gcs import GcsController
+from drivers.gcs.layout import groups_of, read_layout
 from mocks.physics.truth import draw_parameters, machine_file, nominal_parameters
 
 MACHINE = machine_file("tripod")
@@ -111,3 +112,16 @@ async def test_wrong_level_password(bench: Bench, controller: GcsController):
     other = await bench.connect(level="CCL 1 guess")
     with pytest.raises(Refused, match="wrong password"):
         await other.write_parameters({"limb1.h": 261.0})
+
+
+def test_limbs_may_be_called_otherwise() -> None:
+    lines = [
+        "0x7F010001=\t0\t3\tFLOAT\ttower\tzero",
+        "0x7F030001=\t0\t1\tINT\tsystem\tCRC-32",
+    ]
+    groups = groups_of(["tower1.zero", "tower2.zero", "tower3.zero"])
+    assert groups == {"tower"}
+    layout = read_layout(lines, "here", groups)
+    assert list(layout.parameters) == ["tower1.zero", "tower2.zero", "tower3.zero"]
+    with pytest.raises(ProtocolError, match="group leg"):
+        read_layout(lines, "here", groups_of(["leg1.L0"]))

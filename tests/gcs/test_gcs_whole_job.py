@@ -45,7 +45,7 @@ class Lab:
     def site(self, port: str) -> str:
         """A site file with this port."""
         text = (self.folder / "site.toml").read_text(encoding="utf-8")
-        own = parse_site(text, "site.toml", self.folder).controller.settings["channel"]
+        own = parse_site(text, "site.toml", self.folder).controller.address
         path = self.folder / f"site-{len(port)}.toml"
         path.write_text(text.replace(f'"{own}"', f'"{port}"'), encoding="utf-8")
         return path.name
@@ -99,13 +99,13 @@ def test_the_whole_job_on_serial_line_and_tcp(lab: Lab) -> None:
     [
         ('kind = "gcs"', 'kind = "gsc"', "gsc"),
         ('port = "COM3"', "", "port"),
-        ('port = "COM3"', 'port = "COM3"\naxes = "A B"', "2 axes, 3 actuators"),
+        ('port = "COM3"', 'port = "COM3"\naxes = "A B"', "2 words, 3 are wanted"),
         ('port = "COM3"', 'port = "COM3"\nbaudrate = 1', "baudrate"),
         ('port = "COM3"', 'port = "COM3"\nchannel = "can0"', "channel"),
     ],
 )
 def test_site_file_with_a_fault(tmp_path: Path, old: str, new: str, says: str) -> None:
-    assert parse_site(SITE, "site.toml", tmp_path).controller.settings["channel"] == "COM3"
+    assert parse_site(SITE, "site.toml", tmp_path).controller.address == "COM3"
     with pytest.raises(BadInput, match=says):
         parse_site(SITE.replace(old, new), "site.toml", tmp_path)
 

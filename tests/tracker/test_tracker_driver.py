@@ -8,6 +8,8 @@ import pytest
 from tracker_bench import SCALE, Bench, until
 
 from drivers.emscon import EmsconTracker, wire
+from drivers.emscon.codes import WeatherMonitor
+from drivers.emscon.settings import EmsconSettings
 from drivers.errors import ConnectFailed, NoTarget, NotReady, Refused
 
 
@@ -154,3 +156,34 @@ async def test_nobody_at_the_address() -> None:
     await server.wait_closed()
     with pytest.raises(ConnectFailed, match="nobody answers"):
         await EmsconTracker.connect(f"127.0.0.1:{port}")
+
+
+async def test_without_an_object_sensor_there_is_no_such_channel(bench: Bench) -> None:
+    bench.world.faults.inject("tracker-no-object-sensor")
+    await bench.tracker.initialize()
+    assert not bench.tracker.can.object_temperature
+    assert set(await bench.tracker.channels()) == {"air_temp_C", "pressure_hPa", "humidity"}
+    assert any("object" in alarm.what for alarm in bench.alarms)
+
+
+async def test_without_a_weather_station_somebody_must_state_the_air(bench: Bench) -> None:
+    bench.world.faults.inject("tracker-no-weather-station")
+    with pytest.raises(Refused, match="no weather station") as caught:
+        await bench.tracker.initialize()
+    assert "environment" in caught.value.remedy
+
+
+async def test_air_by_hand_is_used_and_is_no_channel(bench: Bench) -> None:
+    bench.world.faults.inject("tracker-no-weather-station")
+    settings = EmsconSettings(
+        weather_monitor=WeatherMonitor.OFF, environment=(21.0, 1000.0, 40.0), margin_s=1.0
+    )
+    await bench.tracker.close()
+    tracker = await EmsconTracker.connect(bench.server.address, SCALE, settings)
+    await tracker.initialize()
+    await tracker.point_at(bench.nest("3"))
+    reading = await tracker.measure(1.0)
+    assert reading.temperature_C is None
+    assert bench.server.instrument.sensor.environment == (21.0, 1000.0, 40.0)
+    assert set(await tracker.channels()) == {"structure_temp_C"}
+    await tracker.close()

@@ -1,6 +1,7 @@
 """The beam: aim, settle, measure, and get it back when it was lost."""
 
 import asyncio
+import contextlib
 from collections import deque
 from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import asynccontextmanager
@@ -23,6 +24,13 @@ _RELOCK_WAIT_S = 0.5
 _TRIES = 4
 
 
+async def choose_reflector(work: Work) -> None:
+    """Choose the site's reflector, where the tracker lets itself be told."""
+    wanted = work.site.tracker.reflector
+    if wanted and work.tracker.can.reflectors:
+        await work.tracker.select_reflector(wanted)
+
+
 async def aim(work: Work, nest: str) -> None:
     """Bring the beam to a nest, by its predicted place; raises NoTarget.
 
@@ -31,10 +39,30 @@ async def aim(work: Work, nest: str) -> None:
     """
     if work.memory.aimed_at == nest:
         return
-    x, y, z = work.predict(nest, work.memory.standing_at or HOME)
     work.memory.aimed_at = ""
-    await work.tracker.point_at((float(x), float(y), float(z)))
+    if work.tracker.can.points:
+        await work.tracker.point_at(_predicted(work, nest))
+    else:
+        await _aimed_by_hand(work, nest)
     work.memory.aimed_at = nest
+
+
+def _predicted(work: Work, nest: str) -> tuple[float, float, float]:
+    x, y, z = work.predict(nest, work.memory.standing_at or HOME)
+    return float(x), float(y), float(z)
+
+
+async def _aimed_by_hand(work: Work, nest: str) -> None:
+    """Have somebody bring the beam to a nest, unless one SMR is carried there in the beam.
+
+    Whether it is the right nest is judged by the reading itself.
+    """
+    if (await work.tracker.state()).locked:
+        return
+    text = f"Bring the tracker's beam onto the SMR in nest {nest}."
+    lost = NoTarget(f"the beam is not on the SMR in nest {nest}", device="tracker")
+    if await work.ask(text, ("done", "stop"), None, lost) == "stop":
+        raise StoppedByOperator(f"stopped when the beam was to be brought to nest {nest}")
 
 
 async def settle(work: Work) -> None:
@@ -45,6 +73,9 @@ async def settle(work: Work) -> None:
     if work.memory.settled:
         return
     limits = work.limits
+    if not work.tracker.can.streams:
+        await _settled_by_readings(work)
+        return
     separation = max(_SAMPLE_S, work.clock.scale / _SAMPLES_PER_WALL_S)
     count = max(round(limits.settle_window_s / separation), 6)
     window: deque[tuple[float, float, float]] = deque(maxlen=count)
@@ -52,6 +83,8 @@ async def settle(work: Work) -> None:
     async with _closing(work.tracker.stream(separation)) as samples:
         async for sample in samples:
             first = sample.time_s if first is None else first
+            if sample.time_s - first > limits.settle_timeout_s:
+                break
             if not sample.valid:
                 window.clear()
                 continue
@@ -63,13 +96,37 @@ async def settle(work: Work) -> None:
                 if settled:
                     work.memory.settled = True
                     return
-            if sample.time_s - first > limits.settle_timeout_s:
-                break
     raise NotReady(
         f"the machine does not come to rest within {limits.settle_timeout_s:g} s",
         device="settling",
         remedy="Look for vibration or air in the beam, or raise settle_std_mm in the site file",
     )
+
+
+async def _settled_by_readings(work: Work) -> None:
+    """Without a continuous mode: short readings, until the last two agree."""
+    limits = work.limits
+    begun, before = work.clock.now(), None
+    while work.clock.now() - begun <= limits.settle_timeout_s:
+        reading = await work.tracker.measure(limits.settle_window_s)
+        if before is not None:
+            creep = float(np.linalg.norm(np.subtract(reading.xyz, before)))
+            settled = creep < limits.settle_creep_mm + 2.0 * _sigma(reading)
+            work.tell(LiveScatter(creep, limits.settle_creep_mm, reading.xyz, settled))
+            if settled:
+                work.memory.settled = True
+                return
+        before = reading.xyz
+    raise NotReady(
+        f"two readings of {limits.settle_window_s:g} s do not agree within "
+        f"{limits.settle_timeout_s:g} s",
+        device="settling",
+        remedy="Look for vibration or air in the beam, or raise settle_creep_mm in the site file",
+    )
+
+
+def _sigma(reading: TrackerReading) -> float:
+    return float(np.sqrt(sum(reading.covariance[:3])))
 
 
 @asynccontextmanager
@@ -158,17 +215,20 @@ async def recover(work: Work, nest: str, lost: DeviceError) -> None:
 
 
 async def _relocked(work: Work, nest: str) -> bool:
-    """Point at the predicted place, then search around it."""
-    x, y, z = work.predict(nest, work.memory.standing_at or HOME)
-    try:
-        await work.tracker.point_at((float(x), float(y), float(z)))
-    except (NoTarget, BeamBroken):
-        try:
-            await work.tracker.find_reflector(float(np.linalg.norm([x, y, z])))
-        except MeasurementError:
-            return False
-    work.memory.aimed_at = nest
-    return True
+    """Point at the predicted place, then search around it; as far as the tracker can."""
+    can, place = work.tracker.can, _predicted(work, nest)
+    found = not can.points and (await work.tracker.state()).locked
+    if can.points:
+        with contextlib.suppress(NoTarget, BeamBroken):
+            await work.tracker.point_at(place)
+            found = True
+    if not found and can.searches:
+        with contextlib.suppress(MeasurementError):
+            await work.tracker.find_reflector(float(np.linalg.norm(place)))
+            found = True
+    if found:
+        work.memory.aimed_at = nest
+    return found
 
 
 async def _make_ready(work: Work, unready: NotReady) -> None:
@@ -177,8 +237,7 @@ async def _make_ready(work: Work, unready: NotReady) -> None:
     state = await work.tracker.state()
     if not state.initialized:
         await work.tracker.initialize()
-        if work.site.tracker.reflector:
-            await work.tracker.select_reflector(work.site.tracker.reflector)
+        await choose_reflector(work)
     else:
         await asyncio.sleep(2.0 * _RELOCK_WAIT_S)
     work.memory.aimed_at = ""

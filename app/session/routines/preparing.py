@@ -7,6 +7,7 @@ from app.session.journal import PARAMETERS
 from app.session.known import compare_with_known
 from app.session.path import check_waypoints, waypoints
 from app.session.plan import Step
+from app.session.routines.beam import choose_reflector
 from app.session.routines.moving import take_stock
 from app.session.work import Done, Work
 from drivers.errors import DeviceFault, NotReady, Refused
@@ -76,9 +77,7 @@ async def check_path(work: Work, step: Step) -> Done:
 async def tracker(work: Work, step: Step) -> Done:
     """Initialise the tracker and choose the reflector."""
     await work.tracker.initialize()
-    wanted = work.site.tracker.reflector
-    if wanted:
-        await work.tracker.select_reflector(wanted)
+    await choose_reflector(work)
     state = await work.tracker.state()
     if not state.initialized:
         raise NotReady(
@@ -87,7 +86,8 @@ async def tracker(work: Work, step: Step) -> Done:
             remedy="Look at the tracker's own controller, then go on",
         )
     work.memory.aimed_at = ""
-    return Done(f"ready, reflector {state.reflector or 'as it was'}, face {state.face}")
+    face = f", face {state.face}" if work.tracker.can.faces else ""
+    return Done(f"ready, reflector {state.reflector or 'as it was'}{face}")
 
 
 async def drives(work: Work, step: Step) -> Done:
@@ -95,6 +95,12 @@ async def drives(work: Work, step: Step) -> Done:
     await work.controller.enable()
     state = await work.controller.state()
     homed = [actuator.name for actuator in state.actuators if not actuator.homed]
+    if homed and not work.controller.can.homes:
+        raise Refused(
+            f"{', '.join(homed)} have lost their reference, and it cannot be found from here",
+            device="controller",
+            remedy="Reference the machine as its maker says, then go on",
+        )
     for name in homed:
         await work.controller.home(name)
     if homed:

@@ -98,6 +98,8 @@ def _misfit(drawn: dict[str, Array], seen: dict[str, Array], rms: float) -> NotR
 
 async def two_face(work: Work, step: Step) -> Done:
     """Read one base nest with both faces of the tracker; half the difference is its error."""
+    if not work.tracker.can.faces:
+        return Done("not done: this tracker has no two faces")
     nest = next(iter(work.site.base_nests))
     await ensure_smr(work, nest)
     one, _ = await measured(work, nest, 1.0)

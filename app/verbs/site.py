@@ -1,0 +1,87 @@
+"""Which devices a site file may name, and what each must be told"""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from app import answer
+from app.devices import all_kinds
+from app.files.site import load_site
+from calib.errors import BadInput
+from drivers.kind import Kind, Setting
+
+
+@click.group()
+def command() -> None:
+    """Help with site files: the kinds of devices there are, and whether a file is right."""
+
+
+@command.command()
+@click.argument("name", required=False)
+@answer.json_option
+def kinds(name: str | None, as_json: bool) -> None:
+    """List the kinds of controllers and trackers, or the settings of one.
+
+    Kinds of installed packages are listed like those that ship.
+    """
+    found = [(role, kind, declared) for role, kind, declared in all_kinds()]
+    chosen = [entry for entry in found if name in (None, entry[1])]
+    if not chosen:
+        raise BadInput(
+            f"no kind of device is called {name!r}",
+            remedy=f"There are {', '.join(kind for _, kind, _ in found)}",
+        )
+    data = {
+        "format": "pkm-kinds/1",
+        "kinds": [_data(role, kind, declared) for role, kind, declared in chosen],
+    }
+    answer.show(data, as_json, _words(chosen, in_full=name is not None))
+
+
+@command.command()
+@click.argument("site_file", type=click.Path(path_type=Path))
+def check(site_file: Path) -> None:
+    """Read a site file and say what it describes; nothing is connected."""
+    site = load_site(site_file)
+    click.echo(
+        f"{site_file}: {site.machine.name}; controller {site.controller.kind} at "
+        f"{site.controller.address}; tracker {site.tracker.kind} at {site.tracker.address}; "
+        f"{len(site.platform_nests)} nests on the platform, {len(site.base_nests)} on the base"
+    )
+
+
+def _data(role: str, name: str, kind: Kind[Any]) -> dict[str, Any]:
+    return {
+        "role": role,
+        "kind": name,
+        "says": kind.says,
+        "settings": [
+            {
+                "name": one.name,
+                "form": one.form,
+                "required": one.required,
+                "default": None if one.required else one.default,
+                "says": one.says,
+            }
+            for one in kind.settings
+        ],
+    }
+
+
+def _words(chosen: list[tuple[Any, str, Kind[Any]]], in_full: bool) -> str:
+    lines: list[str] = []
+    for role, name, kind in chosen:
+        lines.append(f"{role:<11}{name:<12}{kind.says}")
+        if in_full:
+            lines += [f"  {one.name:<18}{_default(one):<16}{one.says}" for one in kind.settings]
+    return "\n".join(lines)
+
+
+def _default(setting: Setting) -> str:
+    if setting.required:
+        return "needed"
+    value = setting.default
+    if value is None or value in ("", {}):
+        return "-"
+    return " ".join(value) if isinstance(value, list) else str(value)

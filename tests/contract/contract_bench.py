@@ -1,0 +1,97 @@
+"""The shipped drivers on their benches: mocks on real wires, one for each law."""
+
+import contextlib
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+
+import numpy as np
+
+from app.files.machines import load_machine
+from drivers.canopen import CanopenController
+from drivers.contract import ControllerBench, TrackerBench
+from drivers.emscon import EmsconTracker
+from drivers.emscon.settings import EmsconSettings
+from drivers.gcs import GcsController
+from drivers.interface import MotionController, Tracker
+from drivers.kind import ActuatorFacts
+from mocks.canopen.server import CanopenStation
+from mocks.clock import ScaledClock
+from mocks.gcs.server import GcsStation
+from mocks.tracker.server import TrackerServer
+from mocks.world import World, WorldPlan
+
+SCALE = 200.0
+LONGEST_S = 20.0
+HOMES = {
+    "hexapod": ((0.0, 0.0, 220.0), (0.0, 0.0, 206.0)),
+    "tripod": ((0.0, 0.0, -121.24355652982142), (10.0, -20.0, -150.0)),
+}
+
+
+@contextlib.asynccontextmanager
+async def emscon_bench() -> AsyncIterator[TrackerBench]:
+    clock = ScaledClock(SCALE)
+    world = World(clock, WorldPlan(seed=4, smrs=3))
+    server = TrackerServer(world, clock)
+    await server.start()
+
+    async def connect() -> Tracker:
+        settings = EmsconSettings(margin_s=1.0)
+        return await EmsconTracker.connect(server.address, SCALE, settings)
+
+    async def target() -> tuple[float, float, float]:
+        x, y, z = world.nest_in_tracker("3", np.array([clock.now()]))[0]
+        return float(x), float(y), float(z)
+
+    async def hide() -> None:
+        server.instrument.break_beam()
+
+    async def silence() -> None:
+        world.faults.inject("tracker-silent")
+
+    try:
+        yield TrackerBench(connect, LONGEST_S, target, hide, silence)
+    finally:
+        await server.stop()
+
+
+@contextlib.asynccontextmanager
+async def controller_bench(machine: str, folder: Path) -> AsyncIterator[ControllerBench]:
+    clock = ScaledClock(SCALE)
+    world = World(clock, WorldPlan(machine=machine, seed=4))
+    on_gcs = machine == "tripod"
+    station = (GcsStation if on_gcs else CanopenStation)(world, folder / "nvm.json")
+    facts = tuple(
+        ActuatorFacts(a.name, a.unit, a.home, a.limits) for a in load_machine(machine).actuators
+    )
+    here, there = ((*place, 0.0, 0.0, 0.0) for place in HOMES[machine])
+
+    async def connect() -> MotionController:
+        host, port = station.address
+        channel = f"socket://{host}:{port}"
+        if on_gcs:
+            return await GcsController.connect(channel)
+        return await CanopenController.connect("slcan", channel, machine=machine)
+
+    async def silence() -> None:
+        world.faults.inject("controller-silent" if on_gcs else "heartbeat-silent:10")
+
+    station.start()
+    try:
+        yield ControllerBench(
+            open=connect,
+            longest_s=LONGEST_S,
+            actuators=facts,
+            poses=(here, there),
+            unreachable=(0.0, 0.0, 5000.0, 0.0, 0.0, 0.0),
+            parameter="limb1.h" if on_gcs else "leg1.B_x",
+            silence=silence,
+        )
+    finally:
+        station.stop()
+
+
+TRACKERS: dict[str, Callable[..., contextlib.AbstractAsyncContextManager[TrackerBench]]] = {
+    "emscon": emscon_bench,
+}
+CONTROLLERS = {"canopen": "hexapod", "gcs": "tripod"}

@@ -1,0 +1,32 @@
+"""The laws of drivers, over every driver that ships."""
+
+from pathlib import Path
+
+import pytest
+from contract_bench import CONTROLLERS, TRACKERS, controller_bench
+
+from app.devices import kind_names
+from drivers.contract import CONTROLLER_LAWS, TRACKER_LAWS, Law, why_not
+
+
+@pytest.mark.parametrize("law", TRACKER_LAWS, ids=str)
+@pytest.mark.parametrize("kind", TRACKERS)
+async def test_tracker(kind: str, law: Law) -> None:
+    async with TRACKERS[kind]() as bench:
+        if reason := await why_not(law, bench):
+            pytest.skip(reason)
+        await law.run(bench)
+
+
+@pytest.mark.parametrize("law", CONTROLLER_LAWS, ids=str)
+@pytest.mark.parametrize("kind", CONTROLLERS)
+async def test_controller(kind: str, law: Law, tmp_path: Path) -> None:
+    async with controller_bench(CONTROLLERS[kind], tmp_path) as bench:
+        if reason := await why_not(law, bench):
+            pytest.skip(reason)
+        await law.run(bench)
+
+
+def test_every_kind_that_ships_has_a_bench() -> None:
+    assert set(TRACKERS) == set(kind_names("tracker"))
+    assert set(CONTROLLERS) == set(kind_names("controller"))
