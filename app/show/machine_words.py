@@ -154,9 +154,11 @@ def _range(name: str, low: float, high: float) -> str:
 def _limits(found: Inspection) -> str:
     machine = found.machine
     rows = []
-    for actuator in machine.actuators:
+    for actuator, axis in zip(machine.actuators, machine.axes, strict=True):
         low, high = found.used.get(actuator.name, (float("nan"), float("nan")))
-        scale, unit = (1.0, "mm") if actuator.unit == "mm" else (float(np.rad2deg(1.0)), "deg")
+        scale, unit = (1.0, "mm") if axis.unit == "mm" else (float(np.rad2deg(1.0)), "deg")
+        if axis.unit == "rad" and axis.moves == "mm":
+            scale, unit = 0.5 / np.pi, "turn"
         cells = [v * scale for v in (*actuator.limits, low, high)]
         rows.append([actuator.name, unit, *(f"{cell:.2f}" for cell in cells)])
     for limb in machine.limbs:

@@ -1,6 +1,7 @@
 """Measure: the step list, what the machine and the tracker do now, the residuals growing."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
 
@@ -18,6 +19,7 @@ from app.tui.planning import NewRun, RunWish, plan_for
 from app.tui.shelf import unfinished
 from app.tui.widgets.plots import MissPlot, ScatterPlot
 from app.tui.widgets.steplist import StepList
+from calib.mechanism.axes import Axis
 
 
 class MeasureFace(Face):
@@ -57,8 +59,8 @@ class MeasureFace(Face):
         steps.show(picture.steps, picture.current)
         done = sum(step.state in ("done", "skipped") for step in picture.steps)
         steps.border_subtitle = f"{done} of {len(picture.steps)}" if picture.steps else ""
-        turning = self.desk.site is not None and self.desk.site.machine.actuators[0].unit == "rad"
-        self.query_one("#now", Static).update(now_text(picture, self.wide, turning))
+        axes = self.desk.site.machine.axes if self.desk.site is not None else ()
+        self.query_one("#now", Static).update(now_text(picture, self.wide, axes))
         base = self.desk.site.base_nests if self.desk.site else ()
         self.query_one(MissPlot).show(picture.points, base)
         scatter = picture.scatter
@@ -119,10 +121,10 @@ class MeasureFace(Face):
         self.app.push_screen(Pick("Go on with", "Sessions, newest first", options), picked)
 
 
-def now_text(picture: Picture, wide: bool, turning: bool) -> Content:
+def now_text(picture: Picture, wide: bool, axes: Sequence[Axis]) -> Content:
     """Six lines that keep their places: step, pose, q, scatter, reading, base and drift.
 
-    ``turning``: the actuators turn; they are shown in degrees.
+    Actuators that turn a joint are shown in degrees, all others in their own unit.
     """
     if not picture.steps:
         return Content.from_markup(
@@ -132,7 +134,7 @@ def now_text(picture: Picture, wide: bool, turning: bool) -> Content:
     rows = [
         ("step", _step(picture)),
         ("pose", _pose(picture, wide)),
-        ("q", _actuators(picture, wide, turning)),
+        ("q", _actuators(picture, wide, axes)),
         ("noise", _scatter(picture)),
         ("read", _reading(picture)),
         ("base", _base(picture)),
@@ -158,16 +160,19 @@ def _pose(picture: Picture, wide: bool) -> Content:
     return Content(f"{x:.1f} {y:.1f} {z:.1f} mm {' '.join(turns)}°")
 
 
-def _actuators(picture: Picture, wide: bool, turning: bool) -> Content:
+def _actuators(picture: Picture, wide: bool, axes: Sequence[Axis]) -> Content:
     live = picture.live
     q = live.q if live is not None else picture.pose.q if picture.pose is not None else None
     if q is None:
         return Content("-")
     sign = "▶" if live is not None and live.moving else " "
-    shown = [math.degrees(x) for x in q] if turning else q
-    digits = (3 if wide else 1) + turning
-    text = ("  " if wide else " ").join(f"{x:.{digits}f}" for x in shown)
-    return Content(f"{sign}{text}{'°' if turning else ''}")
+    digits = 3 if wide else 1
+    turning = {number for number, axis in enumerate(axes) if axis.moves == "rad"}
+    shown = [
+        f"{math.degrees(x):.{digits + 1}f}°" if number in turning else f"{x:.{digits}f}"
+        for number, x in enumerate(q)
+    ]
+    return Content(sign + ("  " if wide else " ").join(shown))
 
 
 def _scatter(picture: Picture) -> Content:

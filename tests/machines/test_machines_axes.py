@@ -33,6 +33,7 @@ from calib.runs.stack import stack
 SHIPPED = shipped_machines()
 MADE = {"gantry": gantry, "screw-delta": screw_delta}
 TEXTS = {"gantry": GANTRY, "screw-delta": screw_delta_text()}
+LOAD = "\n[load]\nplatform_mass_kg = 8.0\nplatform_com = [10.0, 0.0, 50.0]\n"
 RATIO = LEAD_MM / (2.0 * np.pi)
 
 
@@ -57,6 +58,8 @@ def run_of(folder):
             Path(named).write_text(TEXTS[name])
         out = folder / f"run-{name}"
         assert run(["simulate", named, "--out", str(out), "--poses", "16", "--json"]) == 0
+        header = out / "run.toml"
+        header.write_text(header.read_text() + LOAD)
         return out
 
     return make
@@ -115,7 +118,7 @@ def test_unknowns_of_all_effects_are_unique(rows_of, name):
     ("name", "effect"),
     [
         *product(["arm", "gantry", "screw-delta"], ["backlash", "screw-cyclic", "screw-pitch"]),
-        ("gantry", "encoder-cyclic"),
+        *product(["gantry"], ["encoder-cyclic", "gravity-sag", "settling"]),
     ],
 )
 def test_what_is_saved_is_read_back(run_of, tmp_path, capsys, name, effect):
@@ -141,6 +144,10 @@ def test_every_axis_of_a_mixed_machine_errs_in_its_own_unit(rows_of):
         for unknown in effect_named(effect, rows.machine).unknowns(rows):
             if not unknown.nonlinear:
                 assert unknown.unit == units[unknown.name.split(".")[1]], unknown.name
+    assert [(u.name, u.unit) for u in effect_named("gravity-sag", rows.machine).unknowns(rows)] == [
+        ("gravity-sag.c_linear", "mm/N"),
+        ("gravity-sag.c_rotary", "rad/(N mm)"),
+    ]
     linear, rotary = (effect_named(e, rows.machine) for e in ("screw-cyclic", "encoder-cyclic"))
     assert {u.unit for u in linear.unknowns(rows)} == {"mm"}
     assert {u.unit for u in rotary.unknowns(rows)} == {"rad"}
@@ -300,3 +307,11 @@ def test_a_coupling_may_stand_in_the_table_of_its_limb(value):
     text = screw_delta_text().replace(f"Tz:{LEAD_MM:g}mm/turn*q+zero", f"Tz:{value}")
     text = text.replace('type = "tower"', f'type = "tower"\nlead = "{LEAD_MM} mm/turn"')
     assert [axis.ratio for axis in parse_machine(text, "x.toml").axes] == pytest.approx([RATIO] * 3)
+
+
+def test_limits_of_a_motor_behind_a_screw_are_said_in_turns(folder, run_of, capsys):
+    run_of("screw-delta")
+    capsys.readouterr()
+    assert run(["machine", "check", str(folder / "screw-delta.toml")]) == 0
+    line = next(x for x in capsys.readouterr().out.splitlines() if x.startswith("q1 "))
+    assert line.split()[:4] == ["q1", "turn", "50.00", "96.00"]
