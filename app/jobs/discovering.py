@@ -75,6 +75,7 @@ class DiagnosisReport(Report):
     unexplained: UnexplainedEntry
     bad_readings: tuple[BadReadingEntry, ...]
     unavailable: Mapping[str, str]
+    not_on_this_machine: Mapping[str, str]
     advice: str
 
 
