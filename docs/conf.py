@@ -22,7 +22,7 @@ project = "pkmcal"
 html_title = "pkmcal"
 root_doc = "README"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_click"]
-include_patterns = ["*.md", "docs/**"]
+include_patterns = ["*.md", "docs/**", "examples/*.md"]
 exclude_patterns = ["docs/site_order.rst", "docs/images/**", "docs/figures/**", ".*", "site"]
 
 myst_heading_anchors = 3

@@ -7,14 +7,15 @@ from pathlib import Path
 
 from app.cli import TASKS, pkmcal
 
-PACKAGES = ("pkmcal", "calib")
-"""The scripting interface, and the mathematics under it."""
+PACKAGES = ("pkmcal", "app.jobs", "calib")
+"""The scripting interface, what it hands on, and the mathematics under it."""
 
 INDEX = """\
 Programming interface
 =====================
 
-Scripts use :mod:`pkmcal`; the packages of :mod:`calib` are what it stands on.
+Scripts use :mod:`pkmcal`, whose questions and reports are those of :mod:`app.jobs`; the packages of
+:mod:`calib` are what it stands on.
 
 .. toctree::
    :maxdepth: 1

@@ -2,6 +2,7 @@
 
 import ast
 import inspect
+import re
 import subprocess
 import sys
 from dataclasses import fields
@@ -151,3 +152,32 @@ def test_no_function_needs_the_screens_or_the_command_line() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+PAGE = (Path(__file__).parents[2] / "docs" / "scripting.md").read_text("utf-8")
+BLOCKS = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+
+
+def test_the_guide_names_everything_there_is() -> None:
+    missing = [name for name in (*pkmcal.__all__, *JOBS) if not re.search(rf"\b{name}\b", PAGE)]
+    assert missing == []
+
+
+@pytest.mark.parametrize("number", range(len(BLOCKS)))
+def test_code_in_the_guide_uses_what_there_is(number: int) -> None:
+    tree = ast.parse(BLOCKS[number])
+    used = [
+        node.attr
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Attribute) and getattr(node.value, "id", "") == "pkmcal"
+    ]
+    assert used
+    assert set(used) <= set(pkmcal.__all__)
+
+
+def test_the_first_code_in_the_guide_runs_as_it_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    exec(compile(BLOCKS[0], "scripting.md", "exec"), {})
+    assert capsys.readouterr().out.splitlines()[0] == "('backlash',) True"
