@@ -48,7 +48,7 @@ FIELDS = {
     "CompareReport": "effects readings rms_um noise_floor_um chi2_per_dof repeatability "
     "reference_repeatability structure together actuators worst_poses bad_readings advice proposed",
     "DiagnosisReport": "baseline adequate candidates indistinguishable unexplained bad_readings "
-    "unavailable advice",
+    "unavailable not_on_this_machine advice",
     "DiscoveryReport": "steps effects adequate indistinguishable unexplained bad_readings "
     "parameters refused advice",
     "FitReport": "effects readings chi2_per_dof rms_um noise_floor_um holdout_rms_um "
