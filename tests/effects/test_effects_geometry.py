@@ -34,6 +34,7 @@ def grown(text: str, numbers: str, growth: float) -> Machine:
         ("tripod", r"(\nh = .*nominal = )([\d.]+)"),
         ("ptm", r"(t[xyz]:-?)(308|75|119.2630914151789|293.70957598637244|402)\b"),
     ],
+    ids=["delta", "arm", "tripod", "ptm"],
 )
 def test_growth_is_that_of_a_machine_with_longer_parts(name: str, numbers: str) -> None:
     machine = machine_of(text_of(name))
