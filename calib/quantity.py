@@ -58,7 +58,10 @@ def measured(value: object, place: str, like: str = "mm") -> tuple[float, str]:
         raise BadInput(
             f"{value!r} is not a number", place=place, remedy=f'Write 12.5 or "12.5 {like}".'
         )
-    number, unit = (float(value), "") if not isinstance(value, str) else _parsed(value, place)
+    try:
+        number, unit = (float(value), "") if not isinstance(value, str) else _parsed(value, place)
+    except OverflowError:  # a whole number of hundreds of digits
+        number, unit = math.inf, ""
     if not math.isfinite(number):
         raise BadInput(f"{value!r} is not finite", place=place, remedy="Give a finite number.")
     return number, unit

@@ -73,7 +73,7 @@ class TomlTable:
     def place(self, *keys: str | int) -> str:
         """File, line and key."""
         path = (*self._path, *keys)
-        name = f", {keys[-1]}" if keys else ""
+        name = f", {path[-1]}" if path else ""
         return f"{self._source}, line {line_of(self._text, *path)}{name}"
 
     def wrong(self, what: str, *keys: str | int, remedy: str = "") -> BadInput:
@@ -291,6 +291,17 @@ class TomlTable:
         if not isinstance(value, list) or len(value) != length:
             raise self.wrong(f"{key} is {value!r}", key, remedy=f"Write {length} numbers")
         return tuple(quantity(one, unit, self.place(key)) for one in value)
+
+    def limits(self, key: str, unit: str) -> tuple[float, float]:
+        """Read ``[low, high]`` in ``unit``, numbers or texts that carry their own."""
+        low, high = self.quantities(key, 2, unit)
+        if low >= high:
+            raise self.wrong(
+                f"the lower limit {low:g} is not below the upper {high:g}",
+                key,
+                remedy=f"Write {key} = [low, high]",
+            )
+        return low, high
 
     def numbers_by_name(self, key: str) -> dict[str, float]:
         """Read a table of numbers by name; ``leg1.L0 = 1.0`` without quotes is such a name too."""

@@ -21,8 +21,8 @@ from typing import Any
 
 from calib.mechanism.chain import ChainNames
 from calib.mechanism.description import Element, Limb
-from calib.mechanism.tables import TableReader
 from calib.mechanism.traits import Part, Traits, UniversalJoint
+from calib.toml_table import TomlTable
 
 KEYS = (
     "grows", "base_joint", "platform_joint", "screw", "parallelogram", "platform_azimuth", "yields",
@@ -38,20 +38,19 @@ def has_role(element: Element, kind: str) -> bool:
 class TraitReader:
     """Reads the traits of one limb; every fault is named with its line and a remedy."""
 
-    reader: TableReader
+    table: TomlTable
     limb: str
     limbs: Sequence[Limb]
     names: Sequence[ChainNames]
     nominal: Sequence[float]
     """Nominal values of the parameters, by index."""
-    keys: tuple[str, ...]
-    """Where the table stands."""
 
-    def read(self, table: Mapping[str, Any]) -> list[Limb]:
-        """The limbs (one for each chain) with the traits of ``table``."""
-        self.reader.known(table, KEYS, *self.keys)
-        for key in table:
-            self._check_names(key, table[key])
+    def read(self) -> list[Limb]:
+        """The limbs (one for each chain) with their traits."""
+        self.table.only(*KEYS)
+        table = {key: self.table.raw(key, "text or list of texts") for key in self.table}
+        for key, value in table.items():
+            self._check_names(key, value)
         return [
             replace(limb, traits=self._traits(table, chain))
             for chain, limb in enumerate(self.limbs)
@@ -96,7 +95,7 @@ class TraitReader:
                 )
 
     def _fail(self, key: str, what: str, remedy: str) -> Exception:
-        return self.reader.fail(what, *self.keys, key, remedy=remedy)
+        return self.table.wrong(what, key, remedy=remedy)
 
     @staticmethod
     def _listed(key: str, table: Mapping[str, Any]) -> list[str]:
