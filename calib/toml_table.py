@@ -362,6 +362,8 @@ def _bound(bound: float, words: str) -> str:
 
 
 def _either(choices: Collection[str]) -> str:
+    if not choices:
+        return "nothing: none is installed"
     *most, last = (f'"{choice}"' for choice in choices)
     return f"{', '.join(most)} or {last}" if most else last
 
