@@ -172,7 +172,7 @@ class TomlTable:
     def choice(self, key: str, choices: Collection[str], default: str | None = None) -> str:
         """Read one of some words."""
         value = self.text(key, default)
-        self._note(key, Asked(" or ".join(choices), "", default is None, default))
+        self.note(key, Asked(" or ".join(choices), "", default is None, default))
         if value not in choices:
             raise self.wrong(f"{key} is {value!r}", key, remedy=f"Expected {_either(choices)}")
         return value
@@ -230,7 +230,7 @@ class TomlTable:
         if value is None or (not finite and isinstance(value, float)):
             return value
         value = self.number(key, unit=unit, above=above)
-        self._note(key, Asked("number", unit, False, None))
+        self.note(key, Asked("number", unit, False, None))
         return value
 
     def whole(
@@ -306,7 +306,7 @@ class TomlTable:
     def numbers_by_name(self, key: str) -> dict[str, float]:
         """Read a table of numbers by name; ``leg1.L0 = 1.0`` without quotes is such a name too."""
         table = self.named(key, required=False)
-        table._note("", Asked("number", "", False, None))
+        table.note("", Asked("number", "", False, None))
         found = _flat(table._data)
         for name, value in found.items():
             if not _is_number(value) or abs(value) > LARGEST:
@@ -320,7 +320,7 @@ class TomlTable:
     def numbers_here(self) -> dict[str, float]:
         """Every number of this table by its key; what is no number is left alone."""
         if self._named:
-            self._note("", Asked("number", "", False, None))
+            self.note("", Asked("number", "", False, None))
         return {
             key: float(value)
             for key, value in self._data.items()
@@ -337,12 +337,13 @@ class TomlTable:
         """The path of a key with NAME for what the writer of the file chose."""
         return (*self._shown, ANY_NAME if self._named else key)
 
-    def _note(self, key: str, asked: Asked) -> None:
+    def note(self, key: str, asked: Asked) -> None:
+        """Keep what is asked of a key, where a reader knows more of it than its reading tells."""
         self.asked[".".join(self._shown_at(key))] = asked
         self._mine.add(key)
 
     def _get(self, key: str, asked: Asked, example: str = "") -> Any:
-        self._note(key, asked)
+        self.note(key, asked)
         if key not in self._data and asked.required:
             near = difflib.get_close_matches(key, [k for k in self._data if k not in self._mine], 1)
             found = f' (there is "{near[0]}")' if near else ""

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from calib.toml_table import LARGEST, TomlTable
+from calib.toml_table import LARGEST, Asked, TomlTable
 from drivers.kind import Kind, Setting
 
 
@@ -30,6 +30,7 @@ def read_settings(
     values = {}
     for setting in kind.settings:
         values[setting.name] = value = _read(table, setting, actuators, folder)
+        table.note(setting.name, _asked(setting, actuators))
         complaint = setting.check(value) if setting.check is not None and value is not None else ""
         if complaint:
             raise table.wrong(complaint, setting.name, remedy=setting.says)
@@ -40,7 +41,6 @@ def _read(table: TomlTable, setting: Setting, actuators: int, folder: Path) -> A
     """One setting; its default where it is left out."""
     name = setting.name
     if not setting.required and not table.has(name):
-        _ask(table, setting, actuators)
         return setting.default
     count = actuators if setting.count == "actuators" else setting.count
     match setting.form:
@@ -68,9 +68,15 @@ def _read(table: TomlTable, setting: Setting, actuators: int, folder: Path) -> A
             return _plain(table, name)
 
 
-def _ask(table: TomlTable, setting: Setting, actuators: int) -> None:
-    """Let the table know of a key that is left out, so that its page can be checked."""
-    table.raw(setting.name, FORM_WORDS[setting.form])
+def _asked(setting: Setting, actuators: int) -> Asked:
+    """What the site file's page must say of a setting."""
+    kind = " or ".join(setting.choices) or FORM_WORDS[setting.form]
+    if setting.form == "numbers":
+        kind = f"{actuators if setting.count == 'actuators' else setting.count} numbers"
+    default = None if setting.required else setting.default
+    if setting.form == "words" and isinstance(default, list):
+        default = " ".join(default)
+    return Asked(kind, "", setting.required, default)
 
 
 FORM_WORDS = {
@@ -82,7 +88,7 @@ FORM_WORDS = {
     "words": "words in one text",
     "address": "host:port",
     "file": "path",
-    "table": "table",
+    "table": "any keys",
 }
 
 
