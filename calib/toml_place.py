@@ -3,6 +3,7 @@
 import re
 import tomllib
 from collections import Counter
+from functools import lru_cache
 from typing import Any
 
 from calib.errors import BadInput
@@ -31,6 +32,16 @@ def line_of(text: str, *keys: str | int) -> int:
         array of tables says which of them, from 0.
     """
     best, best_length = 1, 0
+    for path, number in _places(text):
+        if len(path) > best_length and path == keys[: len(path)]:
+            best, best_length = number, len(path)
+    return best
+
+
+@lru_cache(maxsize=16)
+def _places(text: str) -> tuple[tuple[tuple[str | int, ...], int], ...]:
+    """Path and line of every table and key, in the order in which they stand."""
+    places: list[tuple[tuple[str | int, ...], int]] = []
     table: tuple[str | int, ...] = ()
     arrays: Counter[tuple[str | int, ...]] = Counter()
     for number, line in enumerate(text.split("\n"), start=1):
@@ -39,14 +50,10 @@ def line_of(text: str, *keys: str | int) -> int:
             if line.lstrip().startswith("[["):
                 arrays[table] += 1
                 table = (*table, arrays[table] - 1)
-            path = table
+            places.append((table, number))
         elif key := _KEY.match(line):
-            path = table + _parts(key.group(1))
-        else:
-            continue
-        if len(path) > best_length and path == keys[: len(path)]:
-            best, best_length = number, len(path)
-    return best
+            places.append((table + _parts(key.group(1)), number))
+    return tuple(places)
 
 
 def load_toml(text: str, source: str) -> dict[str, Any]:

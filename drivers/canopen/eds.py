@@ -1,6 +1,9 @@
-"""Where the EDS files are that ship with the program."""
+"""The EDS files that ship with the program: where they are, and what stands in them."""
 
+from functools import lru_cache
 from pathlib import Path
+
+from canopen import ObjectDictionary, import_od
 
 from drivers.errors import DeviceError
 
@@ -23,3 +26,13 @@ def drive_eds_path(machine: str) -> Path:
     """Return the path of the EDS file of a machine's drives: its own, else ``drive402.eds``."""
     own = EDS_FOLDER / f"{machine}_drive.eds"
     return own if own.is_file() else eds_path("drive402")
+
+
+def dictionary(path: Path, node_id: int) -> ObjectDictionary:
+    """Read the objects of an EDS file as those of a node; the same file is read once."""
+    return _dictionary(str(path), path.stat().st_mtime_ns, node_id)
+
+
+@lru_cache(maxsize=64)
+def _dictionary(path: str, _changed_ns: int, node_id: int) -> ObjectDictionary:
+    return import_od(path, node_id)

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import canopen
 from canopen import ObjectDictionary
+
+from drivers.canopen.eds import dictionary
 
 KINEMATIC, COMPENSATION = range(0x2100, 0x2200), range(0x2200, 0x2300)
 IDENTITY, MACHINE, CHANNELS = 0x1018, 0x2000, 0x2300
@@ -53,7 +54,7 @@ def named_entries(od: ObjectDictionary, indices: range) -> dict[str, Address]:
 
 def read_layout(eds: Path, node_id: int) -> Layout:
     """Read a controller's EDS file."""
-    od: Any = canopen.import_od(str(eds), node_id)
+    od: Any = dictionary(eds, node_id)
     return Layout(
         machine=od[MACHINE][1].default,
         product_code=od[IDENTITY][2].default,

@@ -22,6 +22,7 @@ import canopen
 from canopen.emcy import EmcyError
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
+from drivers.canopen.eds import dictionary
 from drivers.canopen.sdo_abort import REMEDIES, abort_words
 from drivers.errors import (
     ConnectFailed,
@@ -162,7 +163,7 @@ class CanLink:
 
     def add_device(self, node_id: int, eds: Path, label: str) -> "Device":
         """Add a remote node; ``label`` is what errors call it."""
-        node = self._network.add_node(node_id, str(eds))
+        node = self._network.add_node(node_id, dictionary(eds, node_id))
         node.sdo.RESPONSE_TIMEOUT = SDO_DEADLINE_S
         node.tpdo.read(from_od=True)
         node.rpdo.read(from_od=True)

@@ -14,6 +14,8 @@ import canopen
 from canopen.objectdictionary import ODVariable
 from canopen.sdo.exceptions import SdoAbortedError
 
+from drivers.canopen.eds import dictionary
+
 ABORT_RANGE = 0x0609_0030
 ABORT_CANNOT_STORE = 0x0800_0020
 ABORT_DEVICE_STATE = 0x0800_0022
@@ -32,7 +34,7 @@ class StationNode(canopen.LocalNode):
     """
 
     def __init__(self, node_id: int, eds: Path) -> None:
-        super().__init__(node_id, str(eds))
+        super().__init__(node_id, dictionary(eds, node_id))
         self.readers: dict[tuple[int, int], Reader] = {}
         self.writers: dict[tuple[int, int], Writer] = {}
         self.error_register = 0

@@ -1,16 +1,16 @@
 """A mock station for the session's tests, and an ear for its events."""
 
-import json
-import subprocess
-import sys
-from collections.abc import Mapping
+import struct
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mock_process import StationProcess
+
 from app.files.pose_table import Pose
 from app.files.site import Site, site_of_mock
 from app.session import events as ev
+from app.session.links import open_controller
 from mocks.control import ControlClient
 
 SCALE = 400
@@ -30,13 +30,12 @@ POSES: dict[str, Pose] = {
 class Mock:
     """A mock station in a process of its own, its site and its back door."""
 
-    process: "subprocess.Popen[bytes]"
-    announcement: Mapping[str, Any]
+    process: StationProcess
     hands: ControlClient
 
     @property
     def site(self) -> Site:
-        return site_of_mock(self.announcement)
+        return site_of_mock(self.process.announcement)
 
     def site_file(self, folder: Path) -> Path:
         path = folder / "site.toml"
@@ -45,27 +44,21 @@ class Mock:
 
     def end(self) -> None:
         self.hands.close()
-        assert self.process.stdin is not None
-        self.process.stdin.close()
-        try:
-            self.process.wait(timeout=10.0)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-        assert self.process.stdout is not None
-        self.process.stdout.close()
+        self.process.end()
 
 
 def start_mock(*arguments: str, scale: float = SCALE) -> Mock:
-    command = [sys.executable, "-m", "mocks.station", "hexapod", "--json", "--until-stdin-closes"]
-    process = subprocess.Popen(
-        [*command, "--scale", str(scale), *arguments],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-    )
-    assert process.stdout is not None
-    announcement = json.loads(process.stdout.readline())
-    return Mock(process, announcement, ControlClient(announcement["control"]))
+    options = ["hexapod", "--json", "--until-stdin-closes", "--scale", str(scale), *arguments]
+    process = StationProcess(options)
+    return Mock(process, ControlClient(process.announcement["control"]))
+
+
+async def set_speed(mock: Mock, mm_per_s: float) -> None:
+    """Let the legs move this fast from now on: slowly, for what is to happen during a move."""
+    controller = await open_controller(mock.site)
+    device = controller._bus.controller  # type: ignore[attr-defined]
+    await device.call(lambda: device.download(0x2430, 0, struct.pack("<d", mm_per_s)))
+    await controller.close()
 
 
 class Heard:

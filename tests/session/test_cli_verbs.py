@@ -1,5 +1,6 @@
 """The command line as a whole: the list of tasks, exit codes, words, one JSON object."""
 
+import asyncio
 import json
 import os
 import signal
@@ -11,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from session_mock import POSES, Mock, site_text
+from session_mock import POSES, Mock, set_speed, site_text
 
 from app import answer
 from app.cli import TASKS, VERBS, pkmcal, run
@@ -21,7 +22,7 @@ from app.files.pose_table import poses_text
 def cli(*arguments: str, folder: Path) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(
         [sys.executable, "-c", "from app.cli import main; main()", *arguments],
-        cwd=folder, env=os.environ, capture_output=True, text=True, timeout=60,
+        cwd=folder, env=os.environ, capture_output=True, text=True, timeout=100,
     )  # fmt: skip
 
 
@@ -76,21 +77,23 @@ def test_nobody_at_the_address_ends_with_3(
 def test_an_interrupt_ends_with_4_and_resume_answers_one_json_object(
     mock_of: Callable[..., Mock], tmp_path: Path
 ) -> None:
-    mock = mock_of("--smrs", "3", scale=60)
+    mock = mock_of("--smrs", "3")
+    asyncio.run(set_speed(mock, 0.02))
     site = str(mock.site_file(tmp_path))
     command = ["measure", "--site", site, "--poses", two_poses(tmp_path), "--no-warm-up"]
     process = subprocess.Popen(
         [sys.executable, "-c", "from app.cli import main; main()", *command],
         cwd=tmp_path, env=os.environ, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
-    deadline = time.monotonic() + 30.0
+    deadline = time.monotonic() + 60.0
     while not mock.hands("truth")["moving"] and time.monotonic() < deadline:
         time.sleep(0.005)
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=20)
+    _, said = process.communicate(timeout=60)
     assert process.returncode == 4, said
     assert "pkmcal resume" in said
     assert not mock.hands("truth")["moving"]
+    asyncio.run(set_speed(mock, 20.0))
     again = cli("resume", "--json", folder=tmp_path)
     assert again.returncode == 0, again.stderr
     assert json.loads(again.stdout)["readings"] == 14

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from session_mock import POSES, Heard, Mock
+from session_mock import POSES, Heard, Mock, set_speed
 
 from app.errors import GateRefused, StoppedByOperator
 from app.files.pose_table import Pose
@@ -197,21 +197,23 @@ async def test_a_tcp_reset_ends_safely_and_resumes(
     with pytest.raises(LinkError):
         await run(session)
     assert heard.of(ev.Fault)
-    await asyncio.sleep(1.5)  # the machine notices that the PC is gone, and stops by itself
-    assert still(mock)
+    async with asyncio.timeout(30.0):  # the machine notices that the PC is gone, and stops
+        while not still(mock):  # noqa: ASYNC110 - it tells nobody
+            await asyncio.sleep(0.05)
     assert await run(await resumed(session)) == 14
 
 
 async def test_stop_works_during_a_move(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:
-    mock = mock_of("--smrs", "3", scale=6)
+    mock = mock_of("--smrs", "3")
+    await set_speed(mock, 0.02)
     session = begin(mock, tmp_path, heard)
     job = session.start()
 
     def hear(event: ev.Event) -> None:
         if isinstance(event, ev.PoseCommanded) and event.pose_label == "a":
-            asyncio.get_running_loop().call_later(0.02, lambda: stops.append(stop()))
+            asyncio.get_running_loop().call_soon(lambda: stops.append(stop()))
 
     def stop() -> "asyncio.Task[None]":
         stops_at.append(mock.hands("truth")["moving"])
@@ -231,22 +233,26 @@ async def test_stop_works_during_a_move(
 async def test_pause_holds_between_steps_and_skip_leaves_one_out(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:
-    mock = mock_of("--smrs", "3", scale=60)
+    mock = mock_of("--smrs", "3")
     session = begin(mock, tmp_path, heard)
     paused = asyncio.Event()
     when(heard, session, "home", lambda: (session.pause(), paused.set()))
     job = session.start()
-    await asyncio.wait_for(paused.wait(), 20.0)
-    await asyncio.sleep(0.5)
+    await asyncio.wait_for(paused.wait(), 60.0)
     begun = len(heard.of(ev.StepStarted))
-    await asyncio.sleep(0.5)
+    async with asyncio.timeout(60.0):
+        while len(heard.of(ev.StepDone)) < begun:  # noqa: ASYNC110 - the step in work is ended
+            await asyncio.sleep(0.01)
+    await asyncio.sleep(0.3)
     assert len(heard.of(ev.StepStarted)) == begun
-    done: list[str] = []
+    reading: list[str] = []
 
     def skip_first_read(event: ev.Event) -> None:
-        if isinstance(event, ev.StepStarted) and event.kind == "read" and not done:
-            done.append(event.step)
-            asyncio.get_running_loop().call_later(0.05, session.skip, "a bird in the beam")
+        if isinstance(event, ev.StepStarted) and event.kind == "read":
+            reading.append(event.step)
+        if isinstance(event, ev.LiveScatter) and len(reading) == 1:
+            reading.append("it settles: the step is in the middle of its work")
+            session.skip("a bird in the beam")
 
     session.observers.watch(skip_first_read)
     session.resume()

@@ -18,7 +18,7 @@ def program(*arguments: str) -> list[str]:
 
 def cli(folder: Path, *arguments: str) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(
-        program(*arguments), cwd=folder, env=os.environ, capture_output=True, text=True, timeout=60
+        program(*arguments), cwd=folder, env=os.environ, capture_output=True, text=True, timeout=100
     )
 
 
