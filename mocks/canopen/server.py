@@ -108,8 +108,9 @@ class CanopenStation:
     def _run(self) -> None:
         while not self._stopping:
             with self.network.lock:
-                if self._world.faults.take("power-cycle"):
+                if "power-cycle" in self._world.faults:
                     self._power_on()
+                    self._world.faults.take("power-cycle")  # only now: the power is back
                 for drive in self.drives:
                     drive.tick()
                 self.controller.tick()

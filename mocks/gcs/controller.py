@@ -175,8 +175,9 @@ class Controller:
 
     def tick(self) -> None:
         """Look at the sliders and at the PC; called many times a second."""
-        if self.machine.faults.take("power-cycle"):
+        if "power-cycle" in self.machine.faults:
             self.power_on()
+            self.machine.faults.take("power-cycle")  # only now: the power is back
         failed = [slider for slider in self.sliders.values() if slider.tick()]
         if failed:
             for slider in self.sliders.values():
