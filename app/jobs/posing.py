@@ -30,6 +30,7 @@ SITE_SIGMA_UM = 5.0
 class PoseEntry(Record):
     """A pose: its label, the machine's task coordinates (mm, rad) and the actuators' (mm, rad)."""
 
+    FLAT: ClassVar[str] = "coordinates"
     label: str
     q: tuple[float, ...]
     coordinates: Mapping[str, float]

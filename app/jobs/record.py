@@ -10,7 +10,12 @@ from app.plain_data import plain
 
 @dataclass(frozen=True, kw_only=True)
 class Record:
-    """A record whose fields are the keys of a JSON object; ``from_`` is the key ``from``."""
+    """A record whose fields are the keys of a JSON object; ``from_`` is the key ``from``.
+
+    The entries of the mapping ``FLAT`` lie beside the other keys there.
+    """
+
+    FLAT: ClassVar[str] = ""
 
     @classmethod
     def of(cls, table: Mapping[str, Any], **beside: Any) -> Self:

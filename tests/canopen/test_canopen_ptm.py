@@ -18,6 +18,7 @@ from drivers.errors import Refused
 from mocks.control import ControlClient
 from mocks.physics.ptm_body import PtmBody
 from mocks.physics.truth import draw_parameters
+from tests.answers import faults_of
 
 SCALE = 300
 BODY = PtmBody()
@@ -54,6 +55,7 @@ class Lab:
         )
         assert done.returncode == 0, done.stderr
         found: dict[str, Any] = json.loads(done.stdout)
+        assert faults_of(found) == []
         return found
 
 

@@ -16,6 +16,7 @@ from app.files.site import parse_site
 from calib.errors import BadInput
 from mocks.gcs.tripod_kinematics import position_of
 from mocks.physics.truth import machine_file, nominal_parameters
+from tests.answers import faults_of
 
 SCALE = 300
 NOMINAL = nominal_parameters(machine_file("tripod"))
@@ -40,6 +41,7 @@ class Lab:
         )
         assert done.returncode == code, done.stderr
         found: dict[str, Any] = json.loads(done.stdout)
+        assert faults_of(found) == []
         return found
 
     def site(self, port: str) -> str:
