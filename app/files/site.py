@@ -133,7 +133,12 @@ def site_of(top: TomlTable, source: str, folder: Path) -> Site:
     """Check the tables of a site file."""
     top.format(FORMAT)
     machine_name = top.text("machine")
-    machine = load_machine(machine_name, folder)
+    try:
+        machine = load_machine(machine_name, folder)
+    except BadInput as error:
+        if error.place:
+            raise
+        raise top.wrong(error.what, "machine", remedy=error.remedy) from None
     nests = top.table("nests")
     platform, base = nests.named("platform"), nests.named("base")
     site = Site(
