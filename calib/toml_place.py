@@ -3,6 +3,7 @@
 import re
 import tomllib
 from collections import Counter
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -31,17 +32,17 @@ def line_of(text: str, *keys: str | int) -> int:
         Path of the key, for example ``"limbs", "leg1", "B_x"``; a number behind the name of an
         array of tables says which of them, from 0.
     """
-    best, best_length = 1, 0
-    for path, number in _places(text):
-        if len(path) > best_length and path == keys[: len(path)]:
-            best, best_length = number, len(path)
-    return best
+    lines = _lines(text)
+    for length in range(len(keys), 0, -1):
+        if keys[:length] in lines:
+            return lines[keys[:length]]
+    return 1
 
 
 @lru_cache(maxsize=16)
-def _places(text: str) -> tuple[tuple[tuple[str | int, ...], int], ...]:
-    """Path and line of every table and key, in the order in which they stand."""
-    places: list[tuple[tuple[str | int, ...], int]] = []
+def _lines(text: str) -> dict[tuple[str | int, ...], int]:
+    """The first line of every path that a line of the text sets."""
+    lines: dict[tuple[str | int, ...], int] = {}
     table: tuple[str | int, ...] = ()
     arrays: Counter[tuple[str | int, ...]] = Counter()
     for number, line in enumerate(text.split("\n"), start=1):
@@ -50,10 +51,29 @@ def _places(text: str) -> tuple[tuple[tuple[str | int, ...], int], ...]:
             if line.lstrip().startswith("[["):
                 arrays[table] += 1
                 table = (*table, arrays[table] - 1)
-            places.append((table, number))
+            lines.setdefault(table, number)
         elif key := _KEY.match(line):
-            places.append((table + _parts(key.group(1)), number))
-    return tuple(places)
+            lines.setdefault(table + _parts(key.group(1)), number)
+    return lines
+
+
+def joined_names(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Values by dotted name: ``leg1.L0 = 1.0`` without quotes makes a nested table in TOML."""
+    joined: dict[str, Any] = {}
+    for key, value in table.items():
+        name = f"{prefix}{key}"
+        joined |= joined_names(value, f"{name}.") if isinstance(value, Mapping) else {name: value}
+    return joined
+
+
+def keys_of(table: Mapping[str, Any], name: str) -> tuple[str, ...]:
+    """The keys that lead to a name of :func:`joined_names`."""
+    if name in table:
+        return (name,)
+    for key, value in table.items():
+        if isinstance(value, Mapping) and name.startswith(f"{key}."):
+            return (key, *keys_of(value, name[len(key) + 1 :]))
+    return (name,)
 
 
 def load_toml(text: str, source: str) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from typing import Any
 from calib.errors import BadInput
 from calib.plain_text import plain
 from calib.quantity import quantity
-from calib.toml_place import line_of, load_toml
+from calib.toml_place import joined_names, keys_of, line_of, load_toml
 
 LARGEST = sys.float_info.max
 """Bound of a number that may be as large as it likes but not infinite."""
@@ -68,8 +68,6 @@ class TomlTable:
         text = plain(text)
         return cls(load_toml(text, source), text, source)
 
-    # ------------------------------------------------------------------ faults and their places
-
     def place(self, *keys: str | int) -> str:
         """File, line and key."""
         path = (*self._path, *keys)
@@ -91,8 +89,6 @@ class TomlTable:
     def end(self) -> None:
         """Refuse keys that nobody asked for: most likely a typing error."""
         self.only(*sorted(self._mine))
-
-    # ------------------------------------------------------------------ what there is
 
     @property
     def path(self) -> str:
@@ -128,8 +124,6 @@ class TomlTable:
             raise self.wrong(f"format is {value!r}", "format", remedy=remedy)
         return str(value)
 
-    # ------------------------------------------------------------------ tables
-
     def table(self, key: str, *, required: bool = True) -> "TomlTable":
         """Read a table inside this one; an empty one where it may be missing."""
         return self._inside(key, required, named=False)
@@ -157,8 +151,6 @@ class TomlTable:
             raise self.wrong(f"{key} is {value!r}, not a table", key, remedy=f"Write [{key}]")
         path, shown = (*self._path, key), self._shown_at(key)
         return TomlTable(value, self._text, self._source, path, shown, self.asked, named)
-
-    # ------------------------------------------------------------------ words
 
     def text(self, key: str, default: str | None = None) -> str:
         """Read a string."""
@@ -195,8 +187,6 @@ class TomlTable:
             raise self.wrong(f"{key} is {value!r}", key, remedy="Write true or false")
         return value
 
-    # ------------------------------------------------------------------ numbers
-
     def number(
         self,
         key: str,
@@ -216,11 +206,7 @@ class TomlTable:
             raise self.wrong(f"{key} is {value!r}, not a number", key, remedy=remedy)
         if above is not None and value <= above:
             raise self.wrong(f"{key} is {value}", key, remedy=f"It must be greater than {above:g}")
-        if value < least:
-            raise self.wrong(f"{key} is {value}", key, remedy=_bound(least, "at least"))
-        if value > most:
-            raise self.wrong(f"{key} is {value}", key, remedy=_bound(most, "at most"))
-        return float(value)
+        return float(self._within(key, value, least, most))
 
     def optional_number(
         self, key: str, *, unit: str = "", above: float | None = None, finite: bool = True
@@ -274,14 +260,31 @@ class TomlTable:
             raise self.wrong(f"{key} is {value!r}", key, remedy=remedy)
         return tuple(float(one) for one in value)
 
-    def quantity(self, key: str, unit: str, default: float | None = None) -> float:
+    def quantity(
+        self,
+        key: str,
+        unit: str,
+        default: float | None = None,
+        *,
+        least: float = -LARGEST,
+        most: float = LARGEST,
+    ) -> float:
         """Read a number in ``unit``, or a text that carries its own: ``"15 deg"``."""
         asked = Asked("number or text with a unit", unit, default is None, default)
         value = self._get(key, asked, f"{key} = ...")
-        return float(default or 0.0) if value is None else quantity(value, unit, self.place(key))
+        if value is None:
+            return float(default or 0.0)
+        return self._within(key, quantity(value, unit, self.place(key)), least, most)
 
     def quantities(
-        self, key: str, length: int, unit: str, default: tuple[float, ...] | None = None
+        self,
+        key: str,
+        length: int,
+        unit: str,
+        default: tuple[float, ...] | None = None,
+        *,
+        least: float = -LARGEST,
+        most: float = LARGEST,
     ) -> tuple[float, ...]:
         """Read a list of ``length`` numbers in ``unit`` or texts that carry their own."""
         asked = Asked(f"{length} numbers or texts with a unit", unit, default is None, default)
@@ -290,7 +293,15 @@ class TomlTable:
             return default or ()
         if not isinstance(value, list) or len(value) != length:
             raise self.wrong(f"{key} is {value!r}", key, remedy=f"Write {length} numbers")
-        return tuple(quantity(one, unit, self.place(key)) for one in value)
+        place = self.place(key)
+        return tuple(self._within(key, quantity(one, unit, place), least, most) for one in value)
+
+    def _within(self, key: str, value: float, least: float, most: float) -> float:
+        if value < least:
+            raise self.wrong(f"{key} is {value}", key, remedy=_bound(least, "at least"))
+        if value > most:
+            raise self.wrong(f"{key} is {value}", key, remedy=_bound(most, "at most"))
+        return value
 
     def limits(self, key: str, unit: str) -> tuple[float, float]:
         """Read ``[low, high]`` in ``unit``, numbers or texts that carry their own."""
@@ -307,12 +318,12 @@ class TomlTable:
         """Read a table of numbers by name; ``leg1.L0 = 1.0`` without quotes is such a name too."""
         table = self.named(key, required=False)
         table.note("", Asked("number", "", False, None))
-        found = _flat(table._data)
+        found = joined_names(table._data)
         for name, value in found.items():
             if not _is_number(value) or abs(value) > LARGEST:
                 raise table.wrong(
                     f"{name} is {value!r}",
-                    *_path(table._data, name),
+                    *keys_of(table._data, name),
                     remedy="Expected a finite number",
                 )
         return {name: float(value) for name, value in found.items()}
@@ -329,9 +340,7 @@ class TomlTable:
 
     def place_of_name(self, name: str) -> str:
         """Where a name of :meth:`numbers_by_name` stands, in a table read by :meth:`named`."""
-        return self.place(*_path(self._data, name))
-
-    # ------------------------------------------------------------------ inner workings
+        return self.place(*keys_of(self._data, name))
 
     def _shown_at(self, key: str) -> tuple[str, ...]:
         """The path of a key with NAME for what the writer of the file chose."""
@@ -367,22 +376,3 @@ def _either(choices: Collection[str]) -> str:
         return "nothing: none is installed"
     *most, last = (f'"{choice}"' for choice in choices)
     return f"{', '.join(most)} or {last}" if most else last
-
-
-def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Join dotted names: ``leg1.L0 = 1.0`` without quotes makes a nested table in TOML."""
-    flat: dict[str, Any] = {}
-    for key, value in table.items():
-        name = f"{prefix}{key}"
-        flat.update(_flat(value, f"{name}.") if isinstance(value, Mapping) else {name: value})
-    return flat
-
-
-def _path(table: Mapping[str, Any], name: str) -> tuple[str, ...]:
-    """The keys that lead to a name which :func:`_flat` joined."""
-    if name in table:
-        return (name,)
-    for key, value in table.items():
-        if isinstance(value, Mapping) and name.startswith(f"{key}."):
-            return (key, *_path(value, name[len(key) + 1 :]))
-    return (name,)

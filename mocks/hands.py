@@ -7,11 +7,11 @@ the station says no or is not there.
 
 import json
 import sys
-import tomllib
 from pathlib import Path
 from typing import Any
 
 from mocks.control import ControlClient
+from mocks.physics.table_file import read_table
 
 
 def address_of(where: str) -> str:
@@ -19,8 +19,8 @@ def address_of(where: str) -> str:
     path = Path(where)
     if not path.is_file():
         return where
-    hands = tomllib.loads(path.read_text(encoding="utf-8")).get("hands", {})
-    if "control" not in hands:
+    hands = read_table(path).get("hands", {})
+    if not isinstance(hands, dict) or "control" not in hands:
         raise ValueError(f"{path}: this site has no mock's control socket ([hands] control)")
     return str(hands["control"])
 

@@ -1,9 +1,7 @@
 """What is wrong with a mock machine beyond its parameters: a flat table of named numbers."""
 
-import json
 import re
-import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
@@ -13,6 +11,7 @@ from mocks.hidden import effects
 from mocks.hidden.effect import LIMB, HiddenEffect, Physics
 from mocks.physics.circumstances import Stroke
 from mocks.physics.pose import Array
+from mocks.physics.table_file import numbers_by_name, read_table
 
 
 class Hidden:
@@ -25,7 +24,7 @@ class Hidden:
     """
 
     def __init__(self, table: Mapping[str, object] | None = None) -> None:
-        self.values: dict[str, float] = dict(_flat(table or {}))
+        self.values: dict[str, float] = numbers_by_name(table or {}, "hidden effect")
         for name in self.values:
             if _effect_of(name) is None:
                 raise ValueError(
@@ -36,9 +35,11 @@ class Hidden:
     @classmethod
     def read(cls, path: Path) -> "Hidden":
         """Read a TOML or JSON file with a table ``hidden`` (or nothing but the table)."""
-        text = path.read_text(encoding="utf-8")
-        table = json.loads(text) if path.suffix == ".json" else tomllib.loads(text)
-        return cls(table.get("hidden", table))
+        table = read_table(path)
+        hidden = table.get("hidden", table)
+        if not isinstance(hidden, Mapping):
+            raise ValueError(f"{path}: hidden must be a table of names and numbers")
+        return cls(hidden)
 
     @property
     def effects(self) -> tuple[HiddenEffect, ...]:
@@ -81,13 +82,3 @@ def _effect_of(name: str) -> HiddenEffect | None:
         if re.fullmatch(rf"{re.escape(effect.id)}\.({effect.numbers})", name):
             return effect
     return None
-
-
-def _flat(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, float]]:
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{prefix}{key}.")
-        elif isinstance(value, (int, float)) and not isinstance(value, bool):
-            yield prefix + key, float(value)
-        else:
-            raise ValueError(f'hidden effect "{prefix}{key}" must be a number, got {value!r}')

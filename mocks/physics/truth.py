@@ -1,7 +1,5 @@
 """The parameters that a mock machine really has."""
 
-import json
-import tomllib
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
@@ -11,6 +9,7 @@ import numpy as np
 
 from calib.mechanism.description import Machine
 from calib.mechanism.parse import parse_machine
+from mocks.physics.table_file import numbers_by_name, read_table
 
 
 @cache
@@ -45,18 +44,13 @@ def read_parameters(path: Path, machine: Machine) -> dict[str, float]:
 
     Missing ones are nominal. Raises ValueError for a name that the machine does not have.
     """
-    text = path.read_text(encoding="utf-8")
-    table: Mapping[str, object] = (
-        json.loads(text) if path.suffix == ".json" else tomllib.loads(text)
-    )
+    table = read_table(path)
     inner = table.get("parameters", table)
     if not isinstance(inner, Mapping):
         raise ValueError(f"{path}: parameters must be a table of names and numbers")
     truth = nominal_parameters(machine)
-    for name, value in inner.items():
+    for name, value in numbers_by_name(inner, f"{path}: parameter").items():
         if name not in truth:
             raise ValueError(f'{path}: machine {machine.name} has no parameter "{name}"')
-        if not isinstance(value, (int, float)):
-            raise ValueError(f"{path}: {name} must be a number, got {value!r}")
-        truth[name] = float(value)
+        truth[name] = value
     return truth
