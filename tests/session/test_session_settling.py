@@ -14,13 +14,15 @@ from app.session.routines.beam import settle
 from app.session.station import Devices
 from app.session.work import Work
 from drivers.errors import NotReady
-from drivers.interface import TrackSample
+from drivers.interface import TrackerCan, TrackSample
 
 NOISE_MM = 0.003
 
 
 class StreamingTracker:
     """Streams an SMR whose place along x is a function of time, mm and s."""
+
+    can = TrackerCan(streams=True)
 
     def __init__(self, x: Callable[[float], float]) -> None:
         self._x = x
