@@ -74,12 +74,30 @@ def packages() -> list[str]:
 
 
 def page(package: str) -> str:
-    """A page: what the package says, then each of its modules."""
+    """A page: what the package says, then what it offers by name, or else each of its modules."""
     lines = [package, "=" * len(package), "", f".. automodule:: {package}", "   :no-members:", ""]
+    if package == PACKAGES[0]:
+        return "\n".join(lines + offered(package))
     for module in modules(package):
         short = module.removeprefix(f"{package}.")
         lines += [short, "-" * len(short), "", f".. automodule:: {module}", ""]
     return "\n".join(lines)
+
+
+def offered(package: str) -> list[str]:
+    """What scripts import from a package, kind by kind."""
+    module = import_module(package)
+    kinds: dict[str, list[str]] = {name: [] for name in ("function", "class", "exception")}
+    for name in module.__all__:
+        thing = getattr(module, name)
+        failure = isinstance(thing, type) and issubclass(thing, Exception)
+        kind = "exception" if failure else "class" if isinstance(thing, type) else "function"
+        kinds[kind] += [f".. auto{kind}:: {package}.{name}", ""]
+    lines: list[str] = []
+    for heading, kind in (("Calls", "function"), ("Stations and answers", "class"),
+                          ("What goes wrong", "exception")):  # fmt: skip
+        lines += [heading, "-" * len(heading), "", *kinds[kind]]
+    return lines
 
 
 def modules(package: str) -> list[str]:

@@ -17,7 +17,7 @@ from mocks.station import parser as station_parser
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
-OTHERS = ("git", "cd", "cp", "mkdir")
+OTHERS = ("bash", "lint-imports", "mypy", "ruff")
 """Programs that pages use and that are not ours."""
 
 IN_LINE = re.compile(r"(?<!`)`((?:pkmcal|python3?|pytest) [^`\n]+)`")
