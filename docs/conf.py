@@ -10,6 +10,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from pygments.lexers.special import TextLexer
 from site_api import readable, short_types, write_pages
 
 HERE = Path(__file__).parent
@@ -22,7 +23,7 @@ project = "pkmcal"
 html_title = "pkmcal"
 root_doc = "README"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_click"]
-include_patterns = ["*.md", "docs/**", "examples/*.md"]
+include_patterns = ["*.md", "docs/**", "examples/**.md"]
 exclude_patterns = ["docs/site_order.rst", "docs/images/**", "docs/figures/**", ".*", "site"]
 
 myst_heading_anchors = 3
@@ -50,6 +51,7 @@ pygments_dark_style = "monokai"
 def setup(app):
     """Join in while pages are read."""
     write_pages(HERE / "made")
+    app.add_lexer("csv", TextLexer)  # pages say that a block is CSV; there is nothing to colour
     app.connect("source-read", _add_order)
     app.connect("autodoc-process-docstring", readable, priority=400)  # before napoleon
     app.connect("autodoc-process-signature", short_types)
