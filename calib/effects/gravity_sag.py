@@ -51,6 +51,29 @@ def weight_wrench(rows: Rows, rotation: Array) -> tuple[Array, Array]:
     return force, moment
 
 
+def weightless(rows: Rows) -> str:
+    """Say why readings tell nothing of the weight: no [load], no mass; empty if they do."""
+    if any(run.header.load is None for run in rows.runs):
+        return "run.toml has no [load]"
+    masses = rows.channels.get("payload_kg", np.zeros(rows.count))
+    if not np.isfinite(masses[rows.on_platform]).any():
+        return "the column payload_kg is empty"
+    weight = max(r.header.load.platform_mass_kg for r in rows.runs if r.header.load is not None)
+    if weight == 0.0 and not np.nan_to_num(masses).any():
+        return "neither platform nor payload has a mass"
+    return ""
+
+
+def spring_compliance(machine: Machine) -> float:
+    """Compliance of the rods that are springs in the machine file, mm/N; 0 without any."""
+    named = [
+        limb.elements[limb.traits.yields].compliance
+        for limb in machine.limbs
+        if limb.traits.yields is not None
+    ]
+    return max(named, default=0.0)
+
+
 class GravitySag(Effect):
     """One compliance for everything that yields."""
 
@@ -61,25 +84,17 @@ class GravitySag(Effect):
 
     def lacking(self, machine: Machine) -> str:
         """Springs must be part of an elastic closure; actuators yield on any machine."""
-        if _spring_compliance(machine) and not compile_machine(machine).redundant:
+        if spring_compliance(machine) and not compile_machine(machine).redundant:
             return "its springs carry no load that limbs share (trait yields)"
         return ""
 
     def unavailable(self, rows: Rows) -> str:
-        """Without [load] there is no weight to speak of."""
-        if any(run.header.load is None for run in rows.runs):
-            return "run.toml has no [load]"
-        masses = rows.channels.get("payload_kg", np.zeros(rows.count))
-        if not np.isfinite(masses[rows.on_platform]).any():
-            return "the column payload_kg is empty"
-        weight = max(r.header.load.platform_mass_kg for r in rows.runs if r.header.load is not None)
-        if weight == 0.0 and not np.nan_to_num(masses).any():
-            return "neither platform nor payload has a mass"
-        return ""
+        """Without a weight."""
+        return weightless(rows)
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``gravity-sag.c``, mm/N or rad/(N mm); ``.c_linear`` and ``.c_rotary`` where both are."""
-        if _spring_compliance(rows.machine):
+        if spring_compliance(rows.machine):
             return (Unknown("gravity-sag.c", "mm/N", 1e-4),)
         axes = rows.machine.axes
         units = units_of(axes)
@@ -100,7 +115,7 @@ class GravitySag(Effect):
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """Actuator forces; or what the platform gives way for springs of 1 mm/N."""
-        spring = _spring_compliance(situation.machine)
+        spring = spring_compliance(situation.machine)
         if spring:
             return Signature(twist=_given_way(situation)[None] / spring)
         forces, units = actuator_forces(situation), units_of(situation.machine.axes)
@@ -108,16 +123,6 @@ class GravitySag(Effect):
         for number, own in enumerate(units.values()):
             shape[number, own] = forces[own]
         return Signature(extension=shape)
-
-
-def _spring_compliance(machine: Machine) -> float:
-    """Compliance of the rods that are springs in the machine file, mm/N; 0 without any."""
-    named = [
-        limb.elements[limb.traits.yields].compliance
-        for limb in machine.limbs
-        if limb.traits.yields is not None
-    ]
-    return max(named, default=0.0)
 
 
 def _given_way(situation: Situation) -> Array:
