@@ -169,6 +169,9 @@ class World:
             structure=self.climate.structure(times),
             air=self.climate.air(times),
             payload=self._payload.at(times),
+            remembered=lambda tau: np.stack(
+                [leg.remembered(times, tau) for leg in self.legs], axis=1
+            ),
         )
 
     def _start(self, count: int) -> Pose:

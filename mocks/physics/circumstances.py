@@ -3,6 +3,7 @@
 Extensions are in the actuator's unit, mm or rad.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,7 +40,8 @@ class Circumstances:
 
     ``extension`` s (N, n) as the encoders read it; ``play`` (N, n, K); ``step`` (N, n), the last
     move; ``delay`` (N, n) s since it ended (negative while it lasts); temperatures (N,) deg C;
-    ``payload`` (N,) kg.
+    ``payload`` (N,) kg. ``remembered`` tells for a time constant in s the sum (N, n) of all moves
+    that were made, each times exp(-age / time constant).
     """
 
     extension: Array
@@ -49,3 +51,4 @@ class Circumstances:
     structure: Array
     air: Array
     payload: Array
+    remembered: Callable[[float], Array]

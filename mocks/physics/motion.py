@@ -171,6 +171,23 @@ class LegMotion:
             delay[rows] = times[rows] - segment.settled_from
         return LegHistory(extension, play, step, delay)
 
+    def remembered(self, times: Array, tau: float) -> Array:
+        """Sum (N,) of all that was moved until ``times``, each move faded by exp(-age / ``tau``).
+
+        Ages count in s from the end of a move; one that lasts has age 0 and counts as far as it
+        has come.
+        """
+        with self._lock:
+            segments = list(self._segments)
+        left = np.zeros(times.shape)
+        broken_off = [*(segment.time for segment in segments[1:]), np.inf]
+        for segment, next_one in zip(segments, broken_off, strict=True):
+            begun = times >= segment.time
+            end = min(segment.end, next_one)
+            way = segment.position(np.minimum(times[begun], end)) - segment.start
+            left[begun] += way * np.exp(-np.maximum(times[begun] - end, 0.0) / tau)
+        return left
+
     def _at(self, time: float) -> Array:
         return self._segments[-1].position(np.asarray(time))
 

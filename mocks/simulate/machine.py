@@ -53,12 +53,13 @@ def true_poses(
     plan: RunPlan,
     load: Load,
     extension: Array,
+    time: Array,
     channels: Mapping[str, Array],
 ) -> Pose:
     """Where the platform really is at every row.
 
-    ``extension`` (R, n) as commanded; ``channels`` (R,): ``structure_temp_C``, ``air_temp_C``,
-    ``payload_kg``, ``delay_s``.
+    ``extension`` (R, n) as commanded; ``time`` (R,) s; ``channels`` (R,):
+    ``structure_temp_C``, ``air_temp_C``, ``payload_kg``, ``delay_s``.
     """
     widths = play_widths(plan.hidden, body.limbs, body.stroke)
     circumstances = Circumstances(
@@ -69,6 +70,7 @@ def true_poses(
         structure=channels["structure_temp_C"],
         air=channels["air_temp_C"],
         payload=channels["payload_kg"],
+        remembered=lambda tau: _remembered(extension, time, body.stroke.smallest, tau),
     )
     real = body.real(parameters, plan.hidden, load, settles=False)
     return real.poses(circumstances, real.home(len(extension)))
@@ -76,7 +78,23 @@ def true_poses(
 
 def _last_step(extension: Array, smallest: float) -> Array:
     """Last change of each actuator up to every row that was one, (R, n); 0 before the first."""
-    change = np.diff(extension, axis=0, prepend=extension[:1])
+    change = _change(extension)
     rows = np.arange(len(extension))[:, None]
     last = np.maximum.accumulate(np.where(np.abs(change) > smallest, rows, 0), axis=0)
     return np.asarray(np.take_along_axis(change, last, axis=0))
+
+
+def _remembered(extension: Array, time: Array, smallest: float, tau: float) -> Array:
+    """What is left of all moves up to every row, each faded by its age, (R, n)."""
+    change = _change(extension)
+    change[np.abs(change) <= smallest] = 0.0
+    kept = np.exp(-np.diff(time, prepend=time[:1]) / tau)
+    left = np.zeros_like(change)
+    for row in range(1, len(change)):
+        left[row] = kept[row] * left[row - 1] + change[row]
+    return left
+
+
+def _change(extension: Array) -> Array:
+    """Change since the row before, (R, n); 0 in the first."""
+    return np.diff(extension, axis=0, prepend=extension[:1])

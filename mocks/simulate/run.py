@@ -61,7 +61,7 @@ def simulate(plan: RunPlan) -> SimulatedRun:
     channels = _channels(plan, rows)
     load = plan.load or around.load
     extension = q - body.reference(held)
-    truth = machines.true_poses(body, parameters, plan, load, extension, channels)
+    truth = machines.true_poses(body, parameters, plan, load, extension, rows.time, channels)
     station = Station(plan.seed, around.place)
     seen = _seen(plan, rows, truth, station, body)
     covariance = _covariance(plan, seen)

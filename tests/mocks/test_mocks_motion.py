@@ -96,6 +96,29 @@ def test_history_agrees_with_what_was_read_at_the_time() -> None:
     assert leg.history(np.array(times)).extension == pytest.approx(read, abs=1e-12)
 
 
+def test_leg_remembers_its_moves_as_long_as_it_is_asked_to() -> None:
+    clock = ManualClock()
+    leg = LegMotion(clock)
+    leg.command(6.0, 2.0)
+    clock.advance(2.0)
+    leg.command(-4.0, 3.0)  # from 6 to -4, over at 5 s
+    clock.advance(100.0)
+    left = leg.remembered(np.array([-1.0, 1.0, 2.0, 5.0, 65.0]), 60.0)
+    after = 6.0 * np.exp(-3.0 / 60.0) - 10.0
+    assert left == pytest.approx([0.0, 3.0, 6.0, after, after / np.e])
+    assert leg.remembered(np.array([50.0]), 1e9) == pytest.approx([-4.0])
+
+
+def test_leg_remembers_of_a_move_that_was_broken_off_what_was_made() -> None:
+    clock = ManualClock()
+    leg = LegMotion(clock)
+    leg.command(10.0, 2.0)
+    clock.advance(1.0)
+    leg.command(5.0, 1.0)
+    clock.advance(10.0)
+    assert leg.remembered(np.array([10.0]), 1e9) == pytest.approx([5.0])
+
+
 def test_lost_motion_after_moves_up_and_down() -> None:
     """Catalogue: extension = -b/2 after a move forward, +b/2 after a move back."""
     width = np.array([0.02])

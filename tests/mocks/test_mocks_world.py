@@ -157,6 +157,17 @@ def test_settling_fades_with_its_time_constant() -> None:
     assert z[0] > 0.0
 
 
+def test_creep_is_made_good_in_minutes() -> None:
+    w, plain = world({"creep.k": 1e-3, "creep.tau": 300.0}), world()
+    times = np.array([2.0, 302.0])
+    for each in (w, plain):
+        for leg in each.legs:
+            leg.command(6.0, 2.0)
+    z = w.pose(times).position[:, 2] - plain.pose(times).position[:, 2]
+    assert z[0] / z[1] == pytest.approx(np.e, rel=0.01)
+    assert z[0] < 0.0
+
+
 @pytest.mark.parametrize("name", ["joint-tilt.leg2.base.y", "joint-tilt.leg4.platform.z"])
 def test_joint_tilt_moves_the_platform_a_little(name: str) -> None:
     tilted, plain = world({name: 5e-3}), world()
