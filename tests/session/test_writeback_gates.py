@@ -9,7 +9,7 @@ from app.errors import GateRefused
 from app.files.fits import SavedFit
 from app.files.machines import load_machine
 from app.writeback.gates import Gates, gates_of_check, gates_of_proposal, refuse_if_any
-from app.writeback.proposal import propose
+from app.writeback.proposal import Change, propose
 from calib.errors import BadInput
 from calib.pose_error import Summary
 from calib.unknown import Estimate, Unknown
@@ -57,6 +57,19 @@ def test_a_sane_fit_passes_every_gate() -> None:
 )
 def test_what_is_not_sane_is_refused_by_its_gate(fit: SavedFit, gate: str) -> None:
     assert gate in failed(fit)
+
+
+@pytest.mark.parametrize("over", [1.9, 2.1])
+def test_poses_not_seen_may_err_twice_as_much_as_a_perfect_model_shows(over: float) -> None:
+    fit = made()
+    fit = replace(fit, quality={**fit.quality, "holdout_rms_um": over * 9.0})
+    assert failed(fit) == (["holdout"] if over > 2.0 else [])
+
+
+def test_a_change_is_told_in_standard_uncertainties() -> None:
+    change = Change("leg1.L0", 230.0, 230.1, 0.02, "mm", True)
+    assert change.in_sigmas == pytest.approx(5.0)
+    assert np.isnan(replace(change, sigma=0.0).in_sigmas)
 
 
 def test_parameters_that_leave_the_workspace_are_refused() -> None:
@@ -129,6 +142,20 @@ def test_a_cyclic_error_becomes_a_table() -> None:
     assert values["screw-cyclic-table.leg1.period"] == 5.0
     table = [values[f"screw-cyclic-table.leg1.{k}"] for k in range(8)]
     assert table == pytest.approx(list(0.01 * np.sin(np.arange(8) * np.pi / 4)))
+
+
+@pytest.mark.parametrize(
+    ("searched", "held"),
+    [({}, HELD), ({"screw-cyclic.period": 5.0}, {**NOMINAL, **COMPENSATION})],
+    ids=["no period", "no table"],
+)
+def test_a_cyclic_error_needs_its_period_and_a_table_in_the_controller(
+    searched: dict[str, float], held: dict[str, float]
+) -> None:
+    waves = {"screw-cyclic.leg1.sin": 0.01, "screw-cyclic.leg1.cos": 0.0}
+    proposal = propose(MACHINE, made(("screw-cyclic",), **waves, **searched), held)
+    assert "no cyclic table" in proposal.left_out["screw-cyclic"]
+    assert all(change.new == change.old for change in proposal.changes if "cyclic" in change.name)
 
 
 def test_a_fit_of_another_machine_or_of_53_parameters_is_refused() -> None:

@@ -16,7 +16,7 @@ from app.files.runs import read_run
 from app.session import PlanOptions, Session, measure_plan
 from app.session import events as ev
 from app.session.known import compare_with_known, read_held
-from app.session.station import Station
+from app.session.station import Devices, Station
 from app.writeback.gates import Gates
 from app.writeback.procedure import WriteBack, accept, undo
 from app.writeback.transfer import snapshots_of
@@ -254,6 +254,54 @@ async def test_parameters_that_change_while_they_are_read_are_no_set(
         assert held.checksum == await station.controller.parameter_checksum()
     finally:
         await station.close()
+
+
+class CountsStores:
+    """A controller that counts what is stored; once it is not there when it is to load again."""
+
+    def __init__(self, controller: MotionController, breaks: bool) -> None:
+        self._controller, self._breaks = controller, breaks
+        self.stores = 0
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._controller, name)
+
+    async def store_parameters(self) -> None:
+        self.stores += 1
+        await self._controller.store_parameters()
+
+    async def reload_parameters(self) -> None:
+        if self._breaks and self.stores:
+            self._breaks = False
+            raise DeviceError("no answer", device="controller")
+        await self._controller.reload_parameters()
+
+
+@pytest.mark.parametrize(("breaks", "stores"), [(False, 0), (True, 2)])
+async def test_what_may_have_been_stored_is_put_back_for_good_and_nothing_else_is_stored(
+    mock_of: Callable[..., Mock], tmp_path: Path, breaks: bool, stores: int
+) -> None:
+    """Stored, and then it breaks: the earlier set is stored again. Not confirmed: nothing is."""
+    station = Station(mock_of("--smrs", "3", scale=600).site)
+
+    async def answer(*_: object) -> bool:
+        return breaks
+
+    await station.connect()
+    try:
+        counts = CountsStores(station.controller, breaks)
+        tracker = station.tracker
+        station._devices = Devices(cast(MotionController, counts), tracker)
+        gates = Gates.with_limits({"gain": 100.0, "check-peak": 1e6, "check-rms": 10.0})
+        found = small_change(station, by=-1e-3)
+        with pytest.raises((DeviceError, GateRefused)):
+            await WriteBack(station, found, gates, tmp_path, answer, True, CHECK).run()
+        assert counts.stores == stores
+        await station.controller.reload_parameters()  # what survives a power cycle
+        held = await compare_with_known(station.site, station.controller)
+    finally:
+        await station.close()
+    assert held.values["leg1.L0"] == 230.715
 
 
 async def test_a_stop_during_the_check_poses_puts_everything_back(
