@@ -11,6 +11,7 @@ from app.cli import run as pkmcal
 from calib.effects import catalogue
 from calib.errors import BadInput
 from calib.identify import fit, fit_report, hold_out
+from calib.identify.report import unidentified_groups, unidentified_words
 from calib.model import Model
 from calib.model.synthetic import drawn_from_prior, synthetic_rows
 
@@ -80,12 +81,12 @@ def test_identify_whitening_and_back(example):
 
 
 def test_identify_predicted_uncertainty_is_true(example):
-    """A slice of bench/coverage.py: pooled over parameters, 60 trials."""
+    """A slice of bench/coverage.py: pooled over parameters, 32 trials."""
     model = Model(example("no-effect"))
     frames = fit(model).linear.state
     generator = np.random.default_rng(11)
     pulls = []
-    for _ in range(60):
+    for _ in range(32):
         truth = drawn_from_prior(model, frames, generator)
         found = fit(Model(synthetic_rows(model, truth, generator)))
         count = model.free.size
@@ -180,6 +181,22 @@ def test_identify_few_readings_fall_back_on_the_drawing(example):
     assert len(unknown := [p for g in fit_report(found)["unidentified"] for p in g]) > 40, unknown
 
 
+def test_identify_what_is_left_open_is_said_of_one_and_of_several(example):
+    rows = example("no-effect")
+    few = fit(Model(rows.take([name in ("", "1", "2", "3") for name in rows.pose_name])))
+    whole = fit(Model(rows))
+    for found in (few, whole):
+        groups = unidentified_groups(found)
+        for group, said in zip(groups, unidentified_words(found), strict=True):
+            assert ("cannot be told apart" in said) == (len(group) > 1)
+            assert ("stays near its drawing value" in said) == (len(group) == 1)
+            assert all(name in said for name in group)
+    assert {len(group) > 1 for f in (few, whole) for group in unidentified_groups(f)} == {
+        True,
+        False,
+    }
+
+
 def test_identify_readings_on_a_line_are_refused_in_words(example):
     rows = example("no-effect")
     home = [name in ("b1", "b3") for name in rows.nest_name]
@@ -190,6 +207,7 @@ def test_identify_readings_on_a_line_are_refused_in_words(example):
 def test_identify_another_machines_readings_are_refused_in_words(example):
     rows = example("no-effect")
     generator = np.random.default_rng(0)
+    rows = rows.take([name in ("", "1", "2", "3", "4", "5") for name in rows.pose_name])
     wild = replace(
         rows, position=rows.position + 80.0 * generator.standard_normal(rows.position.shape)
     )
