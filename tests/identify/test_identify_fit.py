@@ -33,6 +33,15 @@ def test_identify_example_without_effect_reaches_the_noise(example):
     assert ["leg3.L_B"] in report["unidentified"]
 
 
+def test_identify_unknowns_that_the_readings_determine_are_counted_by_the_hat_matrix(example):
+    found = fit(Model(example("no-effect")))
+    normal = found.jacobian @ found.jacobian.T + np.diag(found.prior_precision)
+    hat = np.sum(found.jacobian * np.linalg.solve(normal, found.jacobian))
+    assert found.trace_hat == pytest.approx(hat, rel=1e-6)
+    assert found.dof == pytest.approx(3.0 * found.readings - hat, rel=1e-6)
+    assert 6.0 < hat < found.model.prior.size
+
+
 def test_identify_exact_readings_leave_no_residual(simulated):
     """Without noise the prediction is met; the priors hold back only what hardly shows."""
     rows, _ = simulated(3, noise=False)
