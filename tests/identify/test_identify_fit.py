@@ -66,7 +66,11 @@ def test_identify_jacobian_with_every_effect_against_central_differences(example
     linear = model.linearise(model.linearise(begin).state)
     # Along random directions in which every unknown moves the readings alike.
     reach = np.sqrt(np.sum(linear.jacobian**2, axis=(1, 2)))
-    size = np.minimum(0.02 / np.maximum(reach, 1e-12), 0.1 * np.minimum(model.prior, 1.0))
+    most = 0.1 * np.minimum(model.prior, 1.0)
+    unknowns = [unknown for group in model.unknowns for unknown in group]
+    for index, unknown in enumerate(unknowns, start=model.free.size):
+        most[index] = 1e-4 if unknown.nonlinear else min(most[index], 10.0 * unknown.size)
+    size = np.minimum(0.02 / np.maximum(reach, 1e-12), most)
     for _ in range(6):
         step = size * generator.standard_normal(size.size)
         ahead, back = (model.predict(model.moved(linear.state, s * step)) for s in (1.0, -1.0))
