@@ -1,10 +1,16 @@
 """From rows to points.csv: order, moves without a reading, and a reader that agrees."""
 
+from importlib import resources
+from pathlib import Path
+
 import numpy as np
 
-from app.session.export import DIGITS, run_of
-from app.session.journal import Row
-from calib.runs import Header, format_points, format_run, parse_run
+from app.files.machines import load_machine
+from app.files.site import parse_site
+from app.session.export import DIGITS, export_run, run_of
+from app.session.journal import Journal, Row
+from app.session.plan import Plan
+from calib.runs import Header, format_points, format_run, parse_header, parse_run
 
 HEADER = Header("hexapod", platform_nests={"3": np.zeros(3), "4": np.ones(3)})
 
@@ -64,3 +70,39 @@ def test_a_session_without_a_row_exports_a_header_alone() -> None:
         ["time_s", "pose", "nest", "q1", "q2", "q3", "q4", "q5", "q6", "x", "y", "z",
          "sx", "sy", "sz", "delay_s"]
     ]  # fmt: skip
+
+
+def test_a_machine_of_the_labs_own_goes_with_the_run(tmp_path: Path) -> None:
+    lab, station = tmp_path / "lab", tmp_path / "lab" / "stations"
+    station.mkdir(parents=True)
+    own = resources.files("calib.machines") / "hexapod.toml"
+    text = own.read_text(encoding="utf-8").replace('name = "hexapod"', 'name = "mine"')
+    (lab / "mine.toml").write_text(text, encoding="utf-8")
+    site = parse_site(SITE, "site.toml", station)
+    plan = Plan("measure", "t", site.machine_name, {}, ())
+    journal = Journal(tmp_path / "journal.sqlite")
+    try:
+        folder = export_run(site, plan, journal, tmp_path / "elsewhere" / "run")
+    finally:
+        journal.close()
+    header = parse_header((folder / "run.toml").read_text(encoding="utf-8"), source="run.toml")
+    assert load_machine(header.machine, folder).name == "mine"
+
+
+SITE = """
+format = "pkm-site/1"
+machine = "../mine.toml"
+[controller]
+kind = "canopen"
+channel = "can0"
+[tracker]
+kind = "emscon"
+address = "10.0.0.1"
+frame = [0, 0, 0, 0, 0, 0]
+[nests.platform]
+3 = [0.0, 100.0, 0.0]
+[nests.base]
+b1 = [260.0, 0.0, -30.0]
+b2 = [0.0, 260.0, -30.0]
+b3 = [-260.0, 0.0, -30.0]
+"""
