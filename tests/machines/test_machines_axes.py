@@ -223,7 +223,7 @@ def test_columns_of_effects_agree_with_differences(rows_of, name):
         linear = model.linearise(replace(start, effects=(values,)))
         for index, unknown in enumerate(group):
             step = np.zeros(model.prior.size)
-            size = 1e-6 if unknown.nonlinear else 1e-3 * unknown.size
+            size = 1e-4 * abs(values[index]) if unknown.nonlinear else 1e-3 * unknown.size
             step[model.free.size + index] = size
             ahead, back = (
                 model.predict(model.moved(linear.state, sign * step)) for sign in (1.0, -1.0)
