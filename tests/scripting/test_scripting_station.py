@@ -108,12 +108,13 @@ def test_script_and_verb_verify_alike(
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("how", ["stop", "interrupt"])
 def test_a_job_that_was_stopped_is_gone_on_with(how: str, site: Path, tmp_path: Path) -> None:
-    reading, heard = threading.Event(), []
+    reading, asked, heard = threading.Event(), threading.Event(), []
 
     def watch(event: ev.Event) -> None:
         heard.append(event)
         if isinstance(event, ev.ReadingTaken) and event.pose_label:
             reading.set()
+            asked.wait(60.0)  # the job must not end before it is asked to stop
 
     with pkmcal.Station(site, folder=tmp_path / "sessions", watch=watch) as station:
 
@@ -123,6 +124,7 @@ def test_a_job_that_was_stopped_is_gone_on_with(how: str, site: Path, tmp_path: 
                 station.stop()
             else:
                 signal.raise_signal(signal.SIGINT)
+            asked.set()
 
         stopping = threading.Thread(target=stop)
         stopping.start()
