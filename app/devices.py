@@ -18,7 +18,19 @@ def _found(role: Role) -> dict[str, EntryPoint]:
 
 
 def kind_names(role: Role) -> list[str]:
-    """Every kind of a role that an installed package offers."""
+    """Every kind of a role that an installed package offers.
+
+    Raises
+    ------
+    BadInput
+        If there is none: pkmcal itself was installed before drivers were found this way.
+    """
+    if not _found(role):
+        raise BadInput(
+            f"no kind of {role} is installed, not even those that ship",
+            place=f"entry points {GROUPS[role]}",
+            remedy="Install pkmcal again: pip install -e . in its folder",
+        )
     return list(_found(role))
 
 
