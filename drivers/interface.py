@@ -1,5 +1,9 @@
 """What the routines ask of any motion controller and any laser tracker.
 
+A device that moves is one of three: a :class:`MotionController` with kinematic parameters of its
+own; :class:`Motors`, which take actuator values; a :class:`PoseMover`, which takes poses. For the
+last two the host holds the parameters and computes the motion.
+
 Units: mm, rad, s, kg, deg C. Every coroutine here ends before a deadline of its own, with an
 answer or with a :class:`drivers.errors.DeviceError`. Deadlines run on wall time.
 """
@@ -66,12 +70,8 @@ class ControllerCan:
     channels: tuple[str, ...] = ()
 
 
-class MotionController(Protocol):
-    """A controller that holds kinematic parameters and moves the machine with them.
-
-    Parameter names are those of the machine file (``leg1.B_x``); compensation values carry the
-    names of the effects that they compensate (``screw-pitch.leg1``, ``backlash.leg1``).
-    """
+class Moving(Protocol):
+    """What everything that moves a machine has, whatever it takes as a command."""
 
     identity: Identity
     can: ControllerCan
@@ -97,18 +97,65 @@ class MotionController(Protocol):
     async def home(self, actuator: str) -> None:
         """Run one actuator's homing."""
 
+    async def wait_arrived(self, timeout: float) -> None:
+        """Wait until everything that moves reports its target reached; ``timeout`` in wall s."""
+
+    async def stop(self) -> None:
+        """Quick stop, at any moment and from any state; never raises for a second call."""
+
+    async def channels(self) -> dict[str, float]:
+        """State readings of the machine: ``structure_temp_C``, ``payload_kg`` and others."""
+
+    async def close(self) -> None:
+        """Release the link; never raises."""
+
+
+class Motors(Moving, Protocol):
+    """Drives that take actuator values and know no kinematics: the host computes the legs.
+
+    ``can.parameters`` is False: parameters live with the host.
+    """
+
+    async def move_actuators(self, q: tuple[float, ...]) -> None:
+        """Start moving every actuator to ``q``, in the order and units of the machine file.
+
+        All start together and arrive together, so that the way is straight in actuator space.
+        Raises Refused for a value outside a drive's limits, before any of them moves.
+        """
+
+
+class PoseMover(Moving, Protocol):
+    """A closed controller that takes poses and shows no parameters: the host corrects them.
+
+    ``can.parameters`` is False. The actuators of its state are its pose axes where it tells no
+    others.
+    """
+
+    async def move_pose(self, pose: tuple[float, ...]) -> None:
+        """Start moving to a pose as the controller understands it: x, y, z in mm; rx, ry, rz in
+        rad, R = Rz(rz) Ry(ry) Rx(rx), about its own pivot. Raises Refused if it refuses it.
+        """
+
+    async def commanded_pose(self) -> tuple[float, ...]:
+        """The pose that it was last told to go to, bit for bit where it can say so."""
+
+    async def frame(self) -> dict[str, str]:
+        """What its poses refer to, in its own words: pivot, coordinate system, rotation order."""
+
+
+class MotionController(Moving, Protocol):
+    """A controller that holds kinematic parameters and moves the machine with them.
+
+    Parameter names are those of the machine file (``leg1.B_x``); compensation values carry the
+    names of the effects that they compensate (``screw-pitch.leg1``, ``backlash.leg1``).
+    """
+
     async def move_to_pose(self, pose: tuple[float, ...]) -> tuple[float, ...]:
         """Command a pose and start moving: x, y, z in mm; rx, ry, rz in rad.
 
         R = Rz(rz) Ry(ry) Rx(rx). Returns the actuator targets q that the controller
         computed with the parameters that it holds. Raises Refused if outside its limits.
         """
-
-    async def wait_arrived(self, timeout: float) -> None:
-        """Wait until every drive reports its target reached; ``timeout`` in wall seconds."""
-
-    async def stop(self) -> None:
-        """Quick stop, at any moment and from any state; never raises for a second call."""
 
     async def read_parameters(self) -> dict[str, float]:
         """Read every kinematic and compensation parameter that the controller uses now."""
@@ -124,12 +171,6 @@ class MotionController(Protocol):
 
     async def reload_parameters(self) -> None:
         """Bring the stored parameters back into use."""
-
-    async def channels(self) -> dict[str, float]:
-        """State readings of the machine: ``structure_temp_C``, ``payload_kg`` and others."""
-
-    async def close(self) -> None:
-        """Release the link; never raises."""
 
 
 @dataclass(frozen=True)

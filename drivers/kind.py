@@ -15,7 +15,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Generic, Literal, TypeVar
 
-from drivers.interface import MotionController, Tracker
+from drivers.interface import MotionController, Motors, PoseMover, Tracker
 
 CONTROLLERS: Final = "pkmcal.controllers"
 TRACKERS: Final = "pkmcal.trackers"
@@ -122,7 +122,10 @@ class Surroundings:
     description: object = None
 
 
-DeviceT = TypeVar("DeviceT", MotionController, Tracker)
+DeviceT = TypeVar("DeviceT", MotionController, Motors, PoseMover, Tracker)
+
+Takes = Literal["parameters", "actuators", "poses"]
+"""What a controller takes: parameters and poses, or actuator values alone, or poses alone."""
 
 
 @dataclass(frozen=True)
@@ -138,9 +141,14 @@ class Kind(Generic[DeviceT]):
         Connects; raises a :class:`drivers.errors.DeviceError` within a deadline of its own.
     address : function
         From the settings, what names this very device: it is shown, and locks the machine.
+    takes : str
+        Of a controller: "parameters" if it opens a :class:`~drivers.interface.MotionController`,
+        "actuators" for :class:`~drivers.interface.Motors`, "poses" for a
+        :class:`~drivers.interface.PoseMover`; for these two the host computes the motion.
     """
 
     says: str
     settings: tuple[Setting, ...]
     open: Callable[[Surroundings], Awaitable[DeviceT]]
     address: Callable[[Mapping[str, Any]], str]
+    takes: Takes = "parameters"
