@@ -136,7 +136,7 @@ class Corrections:
         )
         tell = self._desk.picture.tell
         self._answer = asyncio.get_running_loop().create_future()
-        tell(ev.PromptNeeded(KEEP, text, ("keep", "put back"), None))
+        tell(ev.PromptNeeded(KEEP, text, ("keep", "put back"), "put back"))
         given = ""
         try:
             given = await self._answer

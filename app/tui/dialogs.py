@@ -59,11 +59,13 @@ def choice_keys(choices: Sequence[str]) -> dict[str, str]:
 class Choose(Dialog[str]):
     """A question with a few answers; each has a letter, arrows and enter work as well."""
 
-    def __init__(self, title: str, text: str, choices: Sequence[str], *, first: str = "") -> None:
+    def __init__(
+        self, title: str, text: str, choices: Sequence[str], *, first: str | None = ""
+    ) -> None:
         super().__init__(title)
         self._text = text
         self._keys = choice_keys(choices)
-        self._first = first or next(iter(choices))
+        self._first = next(iter(choices)) if first == "" else first
 
     def body(self) -> ComposeResult:
         """The question and a button for each answer."""
@@ -75,7 +77,7 @@ class Choose(Dialog[str]):
                 yield Button(label, name=choice)
 
     def on_mount(self) -> None:
-        """Put the focus on the proposed answer."""
+        """Put the focus on the proposed answer, if any is proposed."""
         for button in self.query(Button):
             if button.name == self._first:
                 button.focus()
@@ -96,14 +98,17 @@ class Choose(Dialog[str]):
 
 
 class Ask(Choose):
-    """The session's question. Escape lets the operator look first; the question stays."""
+    """The session's question. Escape lets the operator look first; the question stays.
 
+    It opens by itself, perhaps under a key that is just being pressed: where the question proposes
+    no answer, none is under Enter.
+    """
+
+    AUTO_FOCUS: ClassVar[str | None] = ""
     escape_says: ClassVar[str] = "esc: look at the screen first, r comes back here"
 
     def __init__(self, prompt: PromptNeeded, asked_still: Callable[[], bool]) -> None:
-        super().__init__(
-            "The job asks you", prompt.text, prompt.choices, first=prompt.default or ""
-        )
+        super().__init__("The job asks you", prompt.text, prompt.choices, first=prompt.default)
         self._asked_still = asked_still
 
     def on_mount(self) -> None:

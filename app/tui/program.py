@@ -13,6 +13,7 @@ from textual.binding import Binding, BindingType
 from textual.screen import Screen
 
 from app.errors import GateRefused, StoppedByOperator
+from app.session.events import PromptNeeded
 from app.tui.apply import ApplyFace
 from app.tui.desk import POLL_S, Desk
 from app.tui.devices import DevicesFace
@@ -75,7 +76,8 @@ class Workbench(App[None]):
         self.tabs = tuple((face.mode, face.label) for face in FACES)
         self._site = site
         self._ends_on_signals = ends_on_signals
-        self._asked = ""
+        self._asked: PromptNeeded | None = None
+        self._rung: PromptNeeded | None = None
 
     def on_mount(self) -> None:
         """Open the site that the command line named, and begin to watch."""
@@ -173,7 +175,7 @@ class Workbench(App[None]):
         """Open the job's question again."""
         if self.desk.picture.prompt is None:
             self.notify("The job asks nothing.")
-        self._asked = ""
+        self._asked = None
 
     def action_help(self) -> None:
         """Show what the screen is for and its keys."""
@@ -208,17 +210,23 @@ class Workbench(App[None]):
 
     def _watch_prompt(self) -> None:
         prompt = self.desk.picture.prompt
-        if prompt is None or prompt.prompt == self._asked or not isinstance(self.screen, Face):
+        # Names of questions repeat from session to session: it is the question itself that counts.
+        if prompt is None or prompt is self._asked or not isinstance(self.screen, Face):
             return
-        self._asked = name = prompt.prompt
+        self._asked = prompt
+        if self._rung is not prompt:
+            self._rung = prompt
+            self.bell()
 
         def asked_still() -> bool:
-            now = self.desk.picture.prompt
-            return now is not None and now.prompt == name
+            return self.desk.picture.prompt is prompt
 
         def answered(choice: str | None) -> None:
             if choice is not None and asked_still():
-                self.desk.answer(name, choice)
+                try:
+                    self.desk.answer(prompt.prompt, choice)
+                except GateRefused as late:  # the job has ended meanwhile
+                    self.put_up(late)
 
         self.push_screen(Ask(prompt, asked_still), answered)
 

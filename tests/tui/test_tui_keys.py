@@ -1,6 +1,7 @@
 """Keys: the stop key everywhere, prompts, number keys, the palette, errors on the banner."""
 
 import asyncio
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -95,6 +96,37 @@ async def test_question_closes_when_somebody_else_answers(bench: Workbench, tmp_
         bench.desk.picture.tell(stream.ev.PromptAnswered("prompt-1", "done"))
         await pilot.pause(0.3)
         assert isinstance(bench.screen, Face)
+
+
+async def test_a_question_opens_though_an_earlier_one_had_its_name(
+    bench: Workbench, tmp_path: Path
+) -> None:
+    async with bench.run_test(size=(80, 24)) as pilot:
+        await stream.put_up(bench, tmp_path)
+        bench.desk.picture.tell(stream.QUESTION)
+        await pilot.pause(0.3)
+        await pilot.press("d")
+        bench.desk.picture.tell(stream.ev.PromptAnswered("prompt-1", "done"))
+        await pilot.pause(0.3)
+        assert isinstance(bench.screen, Face)
+        bench.desk.picture.tell(replace(stream.QUESTION))
+        await pilot.pause(0.3)
+        assert isinstance(bench.screen, Ask)
+
+
+@pytest.mark.parametrize(("proposed", "focused"), [(None, None), ("stop", "stop")])
+async def test_enter_gives_the_proposed_answer_and_no_other(
+    bench: Workbench, tmp_path: Path, proposed: str | None, focused: str | None
+) -> None:
+    async with bench.run_test(size=(80, 24)) as pilot:
+        await stream.put_up(bench, tmp_path)
+        bench.desk.picture.tell(replace(stream.QUESTION, default=proposed))
+        await pilot.pause(0.3)
+        button = bench.screen.focused
+        assert (button.name if button is not None else None) == focused
+        await pilot.press("enter")
+        await pilot.pause(0.1)
+        assert isinstance(bench.screen, Ask) == (proposed is None)
 
 
 def test_each_choice_has_a_key_of_its_own() -> None:

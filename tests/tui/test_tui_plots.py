@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from textual.app import App, ComposeResult
+from textual_hires_canvas.canvas import Canvas
 
+from app.tui.theme import SERIES
 from app.tui.widgets.frame import duration
-from app.tui.widgets.plots import few_ticks, thin
+from app.tui.widgets.plots import PairPlot, few_ticks, thin
 
 
 def test_thinning_keeps_the_outlier() -> None:
@@ -29,6 +32,27 @@ def test_ticks_are_few_and_inside(size: float) -> None:
     ticks = few_ticks(-0.3 * size, size)
     assert 1 <= len(ticks) <= 4
     assert -0.3 * size <= ticks[0] <= ticks[-1] <= size
+
+
+class Marks(App[None]):
+    """One plot, as large as the screen."""
+
+    def compose(self) -> ComposeResult:
+        yield PairPlot("errors", id="plot")
+
+
+@pytest.mark.parametrize("count", [1, 2, 27])
+async def test_every_point_of_a_series_has_its_mark(count: int) -> None:
+    marker = SERIES[0][0]
+    async with Marks().run_test(size=(120, 30)) as pilot:
+        plot = pilot.app.query_one(PairPlot)
+        x = np.arange(float(count))
+        plot.show({"all": (x, 5.0 + x % 3)}, count)
+        await pilot.pause(0.2)
+        canvas = plot.query_one("#plot", Canvas)
+        lines = [canvas.render_line(row) for row in range(canvas.size.height)]
+        text = "".join(segment.text for line in lines for segment in line)
+        assert text.count(marker) == count
 
 
 def test_time_spans_in_words() -> None:

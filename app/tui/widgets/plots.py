@@ -106,6 +106,8 @@ class PairPlot(QuietPlot):
         drawn = {name: xy for name, xy in series.items() if len(xy[0])}
         if not drawn:
             return
+        ends = [bound for x, _ in drawn.values() for bound in (np.min(x), np.max(x))]
+        self.set_xlimits(*around(float(min(ends)), float(max(ends))))
         tops = [float(np.nanmax(y)) for _, y in drawn.values()]
         self.set_ylimits(0, max(1e-9, max(tops)) * 1.08)
         for (x, y), (marker, style) in zip(drawn.values(), SERIES, strict=False):
@@ -132,6 +134,7 @@ class BinPlot(QuietPlot):
         sigma = np.array([each["sigma"] for each in bins])
         reach = float(np.max(np.abs(y) + sigma)) * 1.1
         self.set_ylimits(-reach, reach)
+        self.set_xlimits(*around(float(x[0]), float(x[-1])))
         self.set_xticks(few_ticks(float(x[0]), float(x[-1])))
         self.plot(x[[0, -1]], np.zeros(2), line_style="#7d8d9a", hires_mode=HiResMode.BRAILLE)
         self.errorbar(x, y, yerr=sigma, marker="o", marker_style="#e8b45a")
@@ -141,6 +144,12 @@ class BinPlot(QuietPlot):
         unit = "µrad" if structure["unit"] == "urad" else "µm"
         shows = structure["shows_in"].removeprefix("extension of ")
         self.border_title = f"{shows}, {unit}, over {over}"
+
+
+def around(low: float, high: float) -> tuple[float, float]:
+    """Limits of an axis that show the marks at both ends: a mark on the limit itself is lost."""
+    margin = 0.02 * (high - low) if high > low else 0.5
+    return low - margin, high + margin
 
 
 def few_ticks(low: float, high: float, most: int = 4) -> list[float]:
