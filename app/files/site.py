@@ -5,7 +5,7 @@ The format ``pkm-site/1`` is described in docs/site-file.md.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.runs.header import Load, load_of
 from calib.toml_table import TomlTable
+from drivers.kind import Takes
 
 FORMAT = "pkm-site/1"
 FARTHEST_MM = 1e9
@@ -28,13 +29,22 @@ FARTHEST_MM = 1e9
 class ControllerSite:
     """Which motion controller it is; ``settings`` holds what its kind declares.
 
-    ``address`` names this very one: its channel or port.
+    ``address`` names this very one: its channel or port. ``takes`` says what it is commanded
+    with (:class:`drivers.kind.Kind`). ``store`` is the folder of the host's
+    parameter sets where the host computes the motion; empty: the usual one.
     """
 
     kind: str
     serial: str
     settings: Mapping[str, Any]
     address: str
+    takes: Takes = "parameters"
+    store: str = ""
+
+    @property
+    def hosted(self) -> bool:
+        """Whether the host computes the motion, with parameters of its own."""
+        return self.takes != "parameters"
 
 
 @dataclass(frozen=True)
@@ -167,6 +177,11 @@ def _standing_alone(top: TomlTable, machine_name: str, folder: Path) -> dict[str
     data = top.as_it_stands()
     if machine_name.endswith(".toml"):
         data["machine"] = str((folder / machine_name).resolve())
+    controller = data.get("controller")
+    if isinstance(controller, dict) and isinstance(controller.get("store"), str):
+        data["controller"] = {
+            **controller, "store": str((folder / controller["store"]).resolve())
+        }  # fmt: skip
     return data
 
 
@@ -191,7 +206,17 @@ def _controller(table: TomlTable, actuators: int, folder: Path) -> ControllerSit
     name = table.choice("kind", kind_names("controller"))
     kind = kind_named("controller", name)
     settings = read_settings(table, kind, actuators, folder)
-    site = ControllerSite(name, table.text("serial", ""), settings, kind.address(settings))
+    serial = table.text("serial", "")
+    address = kind.address(settings)
+    site = ControllerSite(name, serial, settings, address, kind.takes)
+    if store := table.text("store", ""):
+        if not site.hosted:
+            raise table.wrong(
+                f"a controller of the kind {name} keeps its parameters itself",
+                "store",
+                remedy="Leave store out",
+            )
+        site = replace(site, store=str((folder / store).resolve()))
     table.end()
     return site
 

@@ -43,6 +43,8 @@ def export_run(site: Site, plan: Plan, journal: Journal, folder: Path) -> Path:
 
 def _header(site: Site, plan: Plan, held: Mapping[str, float]) -> Header:
     known = site.machine.parameter_index
+    if site.controller.hosted:  # q is what the machine was sent: nothing was done beyond it
+        held = {}
     return Header(
         machine=MACHINE if site.machine_name.endswith(".toml") else site.machine_name,
         title=plan.title,

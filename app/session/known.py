@@ -16,7 +16,7 @@ from pathlib import Path
 
 from app.files.site import Site
 from app.files.text import read_text
-from app.session.ownership import state_folder
+from app.ownership import state_folder
 from calib.errors import BadInput
 from drivers.errors import ParameterError
 from drivers.interface import Identity, MotionController

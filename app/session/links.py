@@ -1,17 +1,56 @@
 """Opens the devices of a site, whatever kinds they are."""
 
+from pathlib import Path
 from typing import cast
 
 from app.devices import kind_named
 from app.files.site import Site
-from drivers.interface import MotionController, Tracker
+from app.hosted.controller import HostedController
+from app.hosted.means import ByMotors, ByPoses
+from app.hosted.store import HostStore, usual_folder
+from drivers.interface import MotionController, Motors, PoseMover, Tracker
 from drivers.kind import ActuatorFacts, Surroundings
 
 
 async def open_controller(site: Site) -> MotionController:
-    """Connect to the site's motion controller; raises a DeviceError if it does not answer."""
+    """Connect to the site's motion controller.
+
+    One that holds no parameters becomes one: the host computes its motion.
+
+    Raises
+    ------
+    DeviceError
+        If it does not answer.
+    GateRefused
+        If another process owns the host's parameters.
+    """
     kind = kind_named("controller", site.controller.kind)
-    return cast(MotionController, await kind.open(_around(site, "controller")))
+    device = await kind.open(_around(site, "controller"))
+    if kind.takes == "parameters":
+        return cast(MotionController, device)
+    means = (
+        ByMotors(cast(Motors, device), site.machine)
+        if kind.takes == "actuators"
+        else ByPoses(cast(PoseMover, device), site.machine)
+    )
+    try:
+        return hosted(site, means)
+    except BaseException:
+        await device.close()
+        raise
+
+
+def hosted(site: Site, means: ByMotors | ByPoses) -> HostedController:
+    """A controller of a device that is open, with the parameters in the site's host store."""
+    said = site.controller.store
+    folder = Path(said) if said else usual_folder(site.machine, means.device.identity)
+    store = HostStore(folder, site.machine)
+    store.open()
+    try:
+        return HostedController(site.machine, means, store)
+    except BaseException:
+        store.close()
+        raise
 
 
 async def open_tracker(site: Site) -> Tracker:

@@ -1,12 +1,14 @@
 """The whole path of a plan, checked against all limits before anything moves."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from app.errors import GateRefused
 from app.files.pose_table import HOME, Pose
 from app.session.plan import Plan
+from calib.arrays import Array
 from calib.mechanism.description import Machine
 from calib.mechanism.limits import Violation, violations
 from calib.mechanism.rigid import Poses
@@ -30,11 +32,18 @@ def check_waypoints(
     controller: Mapping[str, float],
     path: Sequence[Pose],
     labels: Sequence[str],
+    sent: Array | None = None,
 ) -> float:
     """Check poses and the ways between them with the controller's own parameters.
 
     A controller moves its actuators together and linearly, so a way is straight in actuator
     space. Returns the smallest distance to an actuator limit over the path, in its unit.
+
+    Parameters
+    ----------
+    sent : (n, N), optional
+        Extensions that the host will command for these poses, everything compensated, where it
+        computes the motion; they refer to the drawing.
 
     Raises
     ------
@@ -44,6 +53,8 @@ def check_waypoints(
     geometry = {name: v for name, v in controller.items() if name in machine.parameter_index}
     parameters = machine.vector(geometry)
     ends = inverse(machine, Poses.from_xyz_rpy(np.array(path, float).T), parameters)
+    if sent is not None:
+        ends, geometry = replace(ends, extension=sent), {}
     for violation in violations(machine, ends, geometry):
         raise _refusal(f"pose {labels[violation.pose]}", violation)
     s = ends.extension

@@ -7,6 +7,7 @@ from typing import TypeVar
 
 from app.clock import Clock
 from app.files.site import Site
+from app.ownership import Ownership
 from app.session.events import (
     AlarmRaised,
     Connected,
@@ -16,7 +17,6 @@ from app.session.events import (
 )
 from app.session.hands import Carrier, carrier_of
 from app.session.links import open_controller, open_tracker
-from app.session.ownership import Ownership
 from drivers.errors import ConnectFailed, DeviceError
 from drivers.interface import Alarm, Identity, MotionController, Tracker
 

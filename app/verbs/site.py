@@ -9,7 +9,19 @@ from app import answer
 from app.devices import all_kinds
 from app.files.site import load_site
 from calib.errors import BadInput
-from drivers.kind import Kind, Setting
+from drivers.kind import Kind, Setting, Takes
+
+TAKES: dict[Takes, str] = {
+    "parameters": "parameters and poses: it computes its own motion",
+    "actuators": "actuator values: the host computes the motion and keeps the parameters",
+    "poses": "poses: the host corrects them and keeps the parameters",
+}
+STORE = (
+    Setting(
+        "store", "text", "folder of the host's parameter sets, from the site file's folder; else "
+        "one in this computer's own, by machine and serial number", "",
+    ),
+)  # fmt: skip
 
 
 @click.group()
@@ -56,6 +68,7 @@ def _data(role: str, name: str, kind: Kind[Any]) -> dict[str, Any]:
         "role": role,
         "kind": name,
         "says": kind.says,
+        **({"takes": kind.takes} if role == "controller" else {}),
         "settings": [
             {
                 "name": one.name,
@@ -73,8 +86,11 @@ def _words(chosen: list[tuple[Any, str, Kind[Any]]], in_full: bool) -> str:
     lines: list[str] = []
     for role, name, kind in chosen:
         lines.append(f"{role:<11}{name:<12}{kind.says}")
+        if role == "controller":
+            lines.append(f"{'':<23}takes {TAKES[kind.takes]}")
         if in_full:
-            lines += [f"  {one.name:<18}{_default(one):<16}{one.says}" for one in kind.settings]
+            settings = (*kind.settings, *(STORE if kind.takes != "parameters" else ()))
+            lines += [f"  {one.name:<18}{_default(one):<16}{one.says}" for one in settings]
     return "\n".join(lines)
 
 

@@ -11,10 +11,10 @@ from session_mock import POSES, Heard, Mock, set_speed
 from app.errors import GateRefused, StoppedByOperator
 from app.files.pose_table import Pose
 from app.files.site import parse_site
+from app.ownership import Ownership
 from app.session import PlanOptions, Session, measure_plan
 from app.session import events as ev
 from app.session.journal import Journal
-from app.session.ownership import Ownership
 from drivers.errors import (
     DeviceError,
     DriveFault,

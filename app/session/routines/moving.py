@@ -9,6 +9,7 @@ from app.session.events import LivePose, PoseCommanded
 from app.session.journal import NewRow
 from app.session.plan import Step
 from app.session.work import Done, Work
+from calib.mechanism.description import Machine
 from calib.mechanism.rigid import Poses
 from calib.mechanism.task import FULL, task_values
 
@@ -44,7 +45,7 @@ async def go(work: Work, label: str) -> None:
     memory = work.memory
     memory.standing_at, memory.settled = None, False
     pose = work.pose(label)
-    q = await work.controller.move_to_pose(_commanded(work, pose))
+    q = await work.controller.move_to_pose(commanded_coordinates(work.site.machine, pose))
     memory.q = q
     row = NewRow("move", work.clock.now(), label, q)
     work.journal.add_row(work.step, work.attempt, work.clock.utc(), row)
@@ -60,9 +61,9 @@ async def go(work: Work, label: str) -> None:
     work.tell(LivePose(q, q, moving=False))
 
 
-def _commanded(work: Work, pose: Pose) -> tuple[float, ...]:
-    """The coordinates that the controller takes: all six, a position, or tilt and azimuth."""
-    task = work.site.machine.task
+def commanded_coordinates(machine: Machine, pose: Pose) -> tuple[float, ...]:
+    """The coordinates that a controller takes: all six, a position, or tilt and azimuth."""
+    task = machine.task
     values = task_values(task, Poses.from_xyz_rpy(np.array(pose)[:, None]))
     return pose if task.coordinates == FULL else tuple(float(v) for v in values[:, 0])
 

@@ -3,12 +3,13 @@
 import asyncio
 
 from app.errors import StoppedByOperator
+from app.hosted.controller import HostedController
 from app.session.journal import PARAMETERS
 from app.session.known import compare_with_known
 from app.session.path import check_waypoints, waypoints
 from app.session.plan import Step
 from app.session.routines.beam import choose_reflector
-from app.session.routines.moving import take_stock
+from app.session.routines.moving import commanded_coordinates, take_stock
 from app.session.work import Done, Work
 from drivers.errors import DeviceFault, NotReady, Refused
 
@@ -68,9 +69,12 @@ async def _clear_old_faults(work: Work) -> None:
 async def check_path(work: Work, step: Step) -> Done:
     """Check every pose and the way between them against all limits, before anything moves."""
     path = waypoints(work.plan)
-    least = check_waypoints(
-        work.site.machine, work.controller_parameters, [work.pose(p) for p in path], path
-    )
+    poses = [work.pose(label) for label in path]
+    sent = None
+    if isinstance(work.controller, HostedController):
+        coordinates = [commanded_coordinates(work.site.machine, pose) for pose in poses]
+        sent = await work.controller.would_send(coordinates, path)
+    least = check_waypoints(work.site.machine, work.controller_parameters, poses, path, sent)
     return Done(f"{len(path)} moves, {least:.1f} mm or more from every actuator limit")
 
 

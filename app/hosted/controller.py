@@ -1,0 +1,174 @@
+"""A motion controller whose parameters and mathematics are the host's."""
+
+import asyncio
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from app.errors import GateRefused
+from app.hosted.command import commanded_extension
+from app.hosted.means import Means
+from app.hosted.parameters import DEVICE, ParameterSet
+from app.hosted.store import HostStore
+from calib.arrays import Array
+from calib.mechanism.description import Machine
+from drivers.errors import ParameterError, Refused
+from drivers.interface import Alarm, ControllerCan, ControllerState
+
+
+class HostedController:
+    """Takes poses and parameters as any :class:`drivers.interface.MotionController` does.
+
+    Parameters
+    ----------
+    machine : Machine
+    means : Means
+        What moves the machine; closed with this.
+    store : HostStore
+        Open; closed with this.
+    """
+
+    def __init__(self, machine: Machine, means: Means, store: HostStore) -> None:
+        self.machine = machine
+        self._means = means
+        self._store = store
+        self.identity = means.device.identity
+        can = means.device.can
+        self.can = ControllerCan(parameters=True, homes=can.homes, channels=can.channels)
+        self._chosen: ParameterSet | None = None
+        self._broken: ParameterError | None = None
+        self._load()
+
+    def _load(self) -> None:
+        """Take the stored set; one that cannot be used blocks motion, not the way back."""
+        self._chosen = self._broken = None
+        try:
+            _, self._chosen = self._store.load()
+        except ParameterError as error:
+            self._broken = error
+
+    @property
+    def chosen(self) -> ParameterSet:
+        """The set in use; raises :class:`ParameterError` while the store cannot be used."""
+        if self._chosen is None:
+            assert self._broken is not None
+            raise self._broken
+        return self._chosen
+
+    # what moves
+
+    def on_alarm(self, callback: Callable[[Alarm], None]) -> None:
+        """Call ``callback`` for everything that the device says unasked."""
+        self._means.device.on_alarm(callback)
+
+    def check(self) -> None:
+        """Raise the fault that stands at the device, if any."""
+        self._means.device.check()
+
+    async def state(self) -> ControllerState:
+        """Read a snapshot, in the actuators of the machine."""
+        return await self._means.state()
+
+    async def enable(self) -> None:
+        """Bring all drives to operation enabled."""
+        await self._means.device.enable()
+
+    async def disable(self) -> None:
+        """Take the power off all drives."""
+        await self._means.device.disable()
+
+    async def clear_faults(self) -> None:
+        """Reset standing faults."""
+        await self._means.device.clear_faults()
+
+    async def home(self, actuator: str) -> None:
+        """Find the reference of one actuator."""
+        await self._means.home(actuator)
+
+    async def move_to_pose(self, pose: tuple[float, ...]) -> tuple[float, ...]:
+        """Command a pose with the set in use and start moving; returns q as it was sent."""
+        chosen = self.chosen
+        extension = await asyncio.to_thread(
+            commanded_extension, self.machine, chosen, pose, self.identity.kind
+        )
+        return await self._means.send(extension)
+
+    async def would_send(self, poses: Sequence[tuple[float, ...]], labels: Sequence[str]) -> Array:
+        """Extensions (n, N) that these poses would be commanded with, one after the other.
+
+        Nothing moves.
+
+        Raises
+        ------
+        GateRefused
+            Naming the pose that cannot be commanded.
+        """
+        chosen = self.chosen
+        columns = []
+        for label, pose in zip(labels, poses, strict=True):
+            try:
+                columns.append(commanded_extension(self.machine, chosen, pose, ""))
+            except Refused as error:
+                raise GateRefused(
+                    f"pose {label}: {error.what}",
+                    remedy="Leave that pose out or choose poses with pkmcal poses; nothing has "
+                    "moved",
+                ) from error
+        return np.stack(columns, axis=1)
+
+    async def wait_arrived(self, timeout: float) -> None:
+        """Wait until everything that moves has reached its target."""
+        await self._means.device.wait_arrived(timeout)
+
+    async def stop(self) -> None:
+        """Quick stop."""
+        await self._means.device.stop()
+
+    async def channels(self) -> dict[str, float]:
+        """State readings of the device."""
+        return await self._means.device.channels()
+
+    async def close(self) -> None:
+        """Release the link and the store; never raises."""
+        await self._means.device.close()
+        self._store.close()
+
+    # parameters
+
+    async def read_parameters(self) -> dict[str, float]:
+        """Every value with which commands are computed now."""
+        return dict(self.chosen.values)
+
+    async def write_parameters(self, values: Mapping[str, float]) -> None:
+        """Change some values of the set in use, until they are stored or the program ends.
+
+        Raises
+        ------
+        Refused
+            While a drive has power, or for a set that the host cannot compute with.
+        """
+        held = self._chosen.values if self._chosen is not None else {}
+        own = self._chosen.own if self._chosen is not None else {}
+        await self._take(ParameterSet({**held, **values}, own))
+
+    async def _take(self, chosen: ParameterSet) -> None:
+        if (await self.state()).enabled:
+            raise Refused(
+                "parameters are not changed while a drive has power",
+                device=DEVICE,
+                remedy="Take the power off the drives first",
+            )
+        self._chosen, self._broken = chosen.checked(self.machine), None
+
+    async def parameter_checksum(self) -> int:
+        """CRC-32 over the set in use."""
+        return self.chosen.checksum
+
+    async def store_parameters(self) -> None:
+        """Write the set in use to the disk, under the next number."""
+        await asyncio.to_thread(self._store.save, self.chosen)
+
+    async def reload_parameters(self) -> None:
+        """Bring the stored set back into use, read from the disk."""
+        self._load()
+        _ = self.chosen
