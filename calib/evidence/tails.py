@@ -1,4 +1,4 @@
-"""Tail probabilities of chi-square, fast for many values and exact where sf underflows."""
+"""Logarithms of tail probabilities of chi-square, fast for many values, never underflowing."""
 
 from functools import lru_cache
 
@@ -9,6 +9,8 @@ from calib.arrays import Array
 
 TABLE_END = 300.0
 """Chi-square up to which values are interpolated in a table."""
+SMALLEST = 1e-200
+"""Probability below which logarithms are worked out without the probability itself."""
 
 
 def log_tail(chi2: Array, dof: float) -> Array:
@@ -27,19 +29,24 @@ def log_tail(chi2: Array, dof: float) -> Array:
 def _table(dof: float) -> tuple[Array, Array, float]:
     """Square roots of chi-square, log tail at them, and the end of the table."""
     end = TABLE_END + 2.0 * dof
-    roots = np.linspace(0.0, np.sqrt(end), 600)
-    return roots, np.log(special.chdtrc(dof, roots**2)), end
+    roots = np.linspace(0.0, np.sqrt(end), max(600, int(20.0 * np.sqrt(end))))
+    tail = special.chdtrc(dof, roots**2)
+    small = tail < SMALLEST
+    logs = np.log(np.where(small, 1.0, tail))
+    logs[small] = _far_tail(roots[small] ** 2, dof)
+    return roots, logs, end
 
 
 def _far_tail(chi2: Array, dof: float) -> Array:
     """Far from the mean: Gamma(a, x) = x^(a-1) e^-x / (1 - (a-1)/(x - (a-3) - ...)), a = dof/2.
 
     Lentz's continued fraction x + 1 - a - 1(1 - a)/(x + 3 - a - ...), Abramowitz & Stegun 6.5.31
-    in its even form, which converges within a few terms for x well above a.
+    in its even form, which converges within a few terms for x well above a, and within some
+    sqrt(a) of them nearer by.
     """
     a, x = 0.5 * dof, 0.5 * chi2
     fraction = np.zeros_like(x)
-    for term in range(40, 0, -1):
+    for term in range(40 + int(np.sqrt(a)), 0, -1):
         fraction = term * (term - a) / (x + 2.0 * term + 1.0 - a - fraction)
     return np.asarray(a * np.log(x) - x - special.gammaln(a) - np.log(x + 1.0 - a - fraction))
 
@@ -56,7 +63,8 @@ def looks(levels: Array, quantile: float = 0.9) -> float:
 
     n such that P(max < level) = (1 - e^-level)^n at the given quantile; at least one.
     """
-    p = float(np.exp(-np.quantile(levels, quantile)))
+    log_p = -float(np.quantile(levels, quantile))
+    p = float(np.exp(max(log_p, np.log(SMALLEST))))
     if p >= 1.0:
         return 1.0
     return max(1.0, float(np.log(quantile) / np.log1p(-p)))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from discover_synthetic import POSES, Lab
-from scipy import stats
+from scipy import special, stats
 
 from calib.evidence import LinearProblem, diagnose, fill_missing
 from calib.evidence.diagnosis import DRAWS
@@ -213,6 +213,19 @@ def test_directions_that_hardly_move_the_readings_cost_nothing():
     assert whole.dof[0] == 10
     assert crowded > blunt + 1.0
     assert crowded > alone - 1.5
+
+
+@pytest.mark.parametrize("dof", [3, 300, 3000, 40_000])
+def test_tails_of_many_freedoms_are_the_integral_and_never_underflow(dof):
+    for share in (1.0, 1.2, 1.5, 2.0, 3.0):
+        a, x = 0.5 * dof, 0.5 * dof * share
+        beyond = np.geomspace(1e-9, 1.0, 100_001) * (60.0 * np.sqrt(x) + 800.0)
+        log_density = (a - 1.0) * np.log1p(beyond / x) - beyond
+        top = log_density.max()
+        integral = np.trapezoid(np.exp(log_density - top), beyond)
+        wanted = (a - 1.0) * np.log(x) - x - special.gammaln(a) + top + np.log(integral)
+        with np.errstate(all="raise", under="ignore"):
+            assert log_tail(np.array([2.0 * x]), dof)[0] == pytest.approx(wanted, rel=2e-3)
 
 
 @pytest.mark.parametrize("dof", [1, 2, 5, 24])
