@@ -8,7 +8,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, ClassVar
 
-from textual.app import App, SystemCommand
+from textual.app import SystemCommand
 from textual.binding import Binding, BindingType
 from textual.screen import Screen
 
@@ -23,6 +23,7 @@ from app.tui.face import Face
 from app.tui.fit import FitFace
 from app.tui.log import LogFace
 from app.tui.measure import MeasureFace
+from app.tui.painting import Painted
 from app.tui.theme import BENCH
 from app.tui.verify import VerifyFace
 from app.tui.widgets.frame import STOP_KEY
@@ -36,7 +37,7 @@ FACES: tuple[type[Face], ...] = (
 FORESEEN = (BadInput, DeviceError, GateRefused, OSError)
 
 
-class Workbench(App[None]):
+class Workbench(Painted[None]):
     """The operator's screens."""
 
     CSS_PATH = "pkmcal.tcss"
@@ -81,6 +82,7 @@ class Workbench(App[None]):
 
     def on_mount(self) -> None:
         """Open the site that the command line named, and begin to watch."""
+        self.start_painting()
         self.register_theme(BENCH)
         self.theme = BENCH.name
         self.set_interval(0.1, self._watch_prompt)
