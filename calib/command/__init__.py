@@ -1,0 +1,24 @@
+"""What to command so that the platform comes to where it is wanted, with every machine effect.
+
+``identified`` is the machine as a fit found it; ``standing`` where its platform is at given
+commands; ``solver`` the commands for wanted poses; ``history`` what was commanded before;
+``surroundings`` what the machine carries, how warm it is, and when. Derivation: docs/commands.md.
+"""
+
+from calib.command.history import History
+from calib.command.identified import Found, Identified
+from calib.command.solver import Commands, commands_for, pose_commands
+from calib.command.standing import Standpoint, standpoint
+from calib.command.surroundings import Surroundings
+
+__all__ = [
+    "Commands",
+    "Found",
+    "History",
+    "Identified",
+    "Standpoint",
+    "Surroundings",
+    "commands_for",
+    "pose_commands",
+    "standpoint",
+]

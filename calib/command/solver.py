@@ -1,0 +1,262 @@
+"""Commands that bring the platform where it is wanted: Newton on the machine as it really stands.
+
+With y the wanted task coordinates, f(s) the platform's pose at the commands s (``standing``) and
+D = df/ds of the geometry alone, each pass asks the effects once and takes
+
+    s <- s + (T D)^-1 (y - f(s)),     T the task's rows.
+
+What D leaves out is the slope of the effects by s, some hundredths at most, so every pass wins two
+digits or more. Commands of a sequence are solved together: each looks back on those before it as
+they come out, so all that remembers agrees with what is commanded in the end.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib.arrays import Array, BoolArray, IntArray
+from calib.command.history import History
+from calib.command.identified import Identified
+from calib.command.standing import AGREED, Standpoint, command_rows, one_pass
+from calib.command.surroundings import Surroundings
+from calib.errors import BadInput
+from calib.mechanism.configuration import Configuration
+from calib.mechanism.limits import violations
+from calib.mechanism.rigid import Poses
+from calib.mechanism.solve import forward, inverse
+from calib.mechanism.task import task_error, task_rows, task_values
+
+PATIENCE = 40
+"""Passes without one more command of a sequence solved, after which the rest is given up."""
+
+UNREACHABLE = "it cannot be reached: the limbs do not close"
+BEHIND = "it comes after a pose that does not converge"
+STUCK = "it does not converge: no command near it makes up for all effects of the model"
+
+
+@dataclass(frozen=True, eq=False)
+class Commands:
+    """What to command for N wanted poses.
+
+    Attributes
+    ----------
+    wanted : (k, N)
+        Task coordinates, mm and rad.
+    extension, q : (n, N)
+        Commanded extensions, and coordinates by the controller's own parameters; mm or rad. nan
+        where ``refused`` says why.
+    poses : Poses
+        Where the machine then stands, by its model.
+    miss : (N,)
+        What is left to the wanted task coordinates, as a part of the machine's size (rad of turns).
+    passes : int
+        Passes taken for all together.
+    refused : tuple of str, length N
+        Why a pose is not commanded; empty where it is. Those are not on the way of the others.
+    history : History
+        What was commanded, these included in their order; of alternatives that of before.
+    """
+
+    wanted: Array
+    extension: Array
+    q: Array
+    poses: Poses
+    miss: Array
+    passes: int
+    refused: tuple[str, ...]
+    history: History
+    standing: Standpoint
+
+    @property
+    def solved(self) -> BoolArray:
+        """Which poses can be commanded, (N,)."""
+        return np.array([not why for why in self.refused], dtype=bool)
+
+
+def commands_for(
+    identified: Identified,
+    wanted: Poses | Array,
+    surroundings: Surroundings | None = None,
+    history: History | None = None,
+    *,
+    start: Configuration | None = None,
+    alternatives: bool = False,
+) -> Commands:
+    """Commands with which the machine, all its effects in it, takes the wanted poses.
+
+    Parameters
+    ----------
+    identified : Identified
+    wanted : Poses, or (k, N)
+        Task coordinates in the order of ``machine.task``, mm and rad.
+    surroundings : Surroundings, optional
+        Load, temperatures, times, and what else the effects depend on.
+    history : History, optional
+        What was commanded before; a machine at home if not given.
+    start : Configuration of N poses or of one, optional
+        Where the geometry begins: ``commands.standing.closed`` of a pose nearby.
+    alternatives : bool
+        Whether each pose is the next after the history, instead of all one after the other.
+
+    Returns
+    -------
+    Commands
+        A pose that cannot be reached, passes a limit or does not settle is refused in words and
+        left out of the way of those after it; after one that does not settle all are refused.
+
+    Raises
+    ------
+    BadInput
+        For coordinates that are no finite numbers, and if something is not told on which an
+        effect depends.
+    """
+    machine = identified.machine
+    goal = task_values(machine.task, wanted) if isinstance(wanted, Poses) else np.asarray(wanted)
+    _check(machine.task.coordinates, goal)
+    surroundings, history = surroundings or Surroundings(), history or History.at_home(machine)
+    plain = inverse(machine, goal, identified.parameters, start)
+    refused = _by_geometry(plain)
+    while True:
+        steps = _steps(refused, alternatives)
+        attempt = _solved(identified, goal, surroundings, history, steps, plain, refused)
+        if attempt.refused == refused:
+            break
+        refused = attempt.refused
+    if alternatives:
+        return replace(attempt, history=history)
+    return attempt
+
+
+def pose_commands(identified: Identified, commands: Commands) -> Poses:
+    """Poses to tell a controller that computes with its own parameters.
+
+    Its inverse kinematics of such a pose are the actuator coordinates of ``commands``. A pose that
+    was refused stays nan.
+    """
+    machine = identified.machine
+    held = machine.vector(
+        {k: v for k, v in identified.controller.items() if k in machine.parameter_index}
+    )
+    solved = commands.solved
+    found = forward(machine, np.where(solved, commands.extension, 0.0), held)
+    good = solved & found.converged
+    return Poses(
+        np.where(good, found.poses.position, np.nan), np.where(good, found.poses.rotation, np.nan)
+    )
+
+
+def _check(coordinates: tuple[str, ...], goal: Array) -> None:
+    if goal.ndim != 2 or goal.shape[0] != len(coordinates):
+        raise BadInput(
+            f"poses of the shape {goal.shape} are no ({len(coordinates)}, N)",
+            remedy=f"Give {', '.join(coordinates)}",
+        )
+    if not np.isfinite(goal).all():
+        pose = int(np.argmax(~np.isfinite(goal).all(axis=0)))
+        raise BadInput(f"pose {pose + 1} is not finite", remedy="Give numbers in mm and rad")
+
+
+def _by_geometry(plain: Configuration) -> tuple[str, ...]:
+    return tuple("" if good else UNREACHABLE for good in plain.converged)
+
+
+def _steps(refused: tuple[str, ...], alternatives: bool) -> IntArray:
+    """The command that each follows, those that are refused left out; -1 for the history."""
+    steps = np.full(len(refused), -1, dtype=np.intp)
+    last = -1
+    for row, why in enumerate(refused):
+        steps[row] = -1 if alternatives else last
+        if not why:
+            last = row
+    return steps
+
+
+def _solved(
+    identified: Identified,
+    goal: Array,
+    surroundings: Surroundings,
+    history: History,
+    steps: IntArray,
+    plain: Configuration,
+    refused: tuple[str, ...],
+) -> Commands:
+    """One attempt at all poses that are not refused yet."""
+    kept = np.array([not why for why in refused], dtype=bool)
+    extension = np.where(kept, plain.extension, history.extension[:, -1:])
+    near: Standpoint | None = None
+    passes = best = waited = 0
+    while True:
+        rows = command_rows(identified, extension, surroundings, history, steps)
+        near = one_pass(identified, rows, near, plain)
+        error = _error(identified, goal, near)
+        miss = _size(identified, error)
+        good = near.agreed & (miss <= AGREED) | ~kept
+        passes += 1
+        done = int(good.sum()) if np.all(steps < 0) else int(np.logical_and.accumulate(good).sum())
+        waited = 0 if done > best else waited + 1
+        best = max(best, done)
+        if good.all() or waited > PATIENCE:
+            break
+        moved = extension + np.where(kept, _towards(identified, error, near), 0.0)
+        extension = np.where(np.isfinite(moved), moved, extension)
+    why = _why(identified, near, refused, good, steps)
+    solved = np.array([not one for one in why], dtype=bool)
+    extension = np.where(solved, extension, np.nan)
+    times = surroundings.times(goal.shape[1])
+    q = identified.machine.coordinates(extension, identified.controller)
+    after = History(
+        np.concatenate([history.extension, extension[:, solved]], axis=1),
+        np.concatenate([history.time_s, times[solved]]),
+    )
+    return Commands(goal, extension, q, near.poses, miss, passes, why, after, near)
+
+
+def _error(identified: Identified, goal: Array, near: Standpoint) -> Array:
+    """What is left to the wanted task coordinates, (k, N)."""
+    task = identified.machine.task
+    return np.asarray(task_error(task, goal, near.poses.position, near.poses.rotation))
+
+
+def _size(identified: Identified, error: Array) -> Array:
+    """Largest of it, lengths as parts of the machine's size, (N,)."""
+    machine = identified.machine
+    unit = np.array([machine.size if name in "xyz" else 1.0 for name in machine.task.coordinates])
+    return np.asarray(np.max(np.abs(error) / unit[:, None], axis=0))
+
+
+def _towards(identified: Identified, error: Array, near: Standpoint) -> Array:
+    """Step (n, N) of the commands that takes the error away by the geometry alone."""
+    T = task_rows(identified.machine.task, near.poses.rotation)
+    slope = np.einsum("tcn,acn->nta", T, near.twists)
+    finite = np.isfinite(slope).all(axis=(1, 2)) & np.isfinite(error).all(axis=0)
+    slope = np.where(finite[:, None, None], slope, np.eye(*slope.shape[1:]))
+    step = np.einsum("nat,tn->an", np.linalg.pinv(slope), np.where(finite, error, 0.0))
+    return np.asarray(step)
+
+
+def _why(
+    identified: Identified,
+    near: Standpoint,
+    refused: tuple[str, ...],
+    good: BoolArray,
+    steps: IntArray,
+) -> tuple[str, ...]:
+    """Why poses are not commanded; where a sequence got stuck, nothing after it is."""
+    why = list(refused)
+    if not good.all():
+        stuck = np.flatnonzero(~good)
+        for row in stuck:
+            why[row] = STUCK if near.closed.converged[row] else UNREACHABLE
+        if not np.all(steps < 0):
+            after = range(stuck[0] + 1, good.size)
+            why[stuck[0] + 1 :] = [why[row] if refused[row] else BEHIND for row in after]
+        return tuple(why)
+    machine, controller = identified.machine, identified.controller
+    commanded = replace(near.closed, extension=near.extension)
+    for one in violations(machine, commanded, controller):
+        if not why[one.pose]:
+            why[one.pose] = (
+                f"it passes a limit: {one.what} = {one.value:.6g} {one.unit}, "
+                f"and {one.low:.6g} to {one.high:.6g} are allowed"
+            )
+    return tuple(why)
