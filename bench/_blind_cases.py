@@ -114,9 +114,11 @@ def build_follow_up(
 ) -> SimulatedRun:
     """Simulate a second run of the same machine on another day, in another frame.
 
-    A step of the frame happened in the first run and is not in this one; everything else is.
+    A step of the frame happened in the first run and is not in this one, nor is that of an actuator
+    that was homed between; everything else is.
     """
-    left = {name: value for name, value in hidden.items() if not name.startswith("frame-shift")}
+    over = ("frame-shift.", "actuator-step.")
+    left = {name: value for name, value in hidden.items() if not name.startswith(over)}
     channels = first.channels
     profile = Profile(
         start_C=conditions.get("structure_temp_C", float(channels["structure_temp_C"][-1])),

@@ -172,6 +172,7 @@ class World:
             remembered=lambda tau: np.stack(
                 [leg.remembered(times, tau) for leg in self.legs], axis=1
             ),
+            time=times,
         )
 
     def _start(self, count: int) -> Pose:

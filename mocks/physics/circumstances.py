@@ -41,7 +41,8 @@ class Circumstances:
     ``extension`` s (N, n) as the encoders read it; ``play`` (N, n, K); ``step`` (N, n), the last
     move; ``delay`` (N, n) s since it ended (negative while it lasts); temperatures (N,) deg C;
     ``payload`` (N,) kg. ``remembered`` tells for a time constant in s the sum (N, n) of all moves
-    that were made, each times exp(-age / time constant).
+    that were made, each times exp(-age / time constant). ``time`` (N,) s since the run (of the
+    live machine: the day) began.
     """
 
     extension: Array
@@ -52,3 +53,4 @@ class Circumstances:
     air: Array
     payload: Array
     remembered: Callable[[float], Array]
+    time: Array

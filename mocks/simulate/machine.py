@@ -71,6 +71,7 @@ def true_poses(
         air=channels["air_temp_C"],
         payload=channels["payload_kg"],
         remembered=lambda tau: _remembered(extension, time, body.stroke.smallest, tau),
+        time=time,
     )
     real = body.real(parameters, plan.hidden, load, settles=False)
     return real.poses(circumstances, real.home(len(extension)))

@@ -108,7 +108,7 @@ def test_motors_yield_by_the_virtual_work_of_the_weight() -> None:
     load = Load(platform_mass_kg=5.0, platform_com=(100.0, 0.0, 0.0))
     c = Circumstances(
         np.zeros((1, 2)), np.zeros((1, 2, 4)), np.zeros((1, 2)), np.full((1, 2), 1e3),
-        np.full(1, 20.0), np.full(1, 20.0), np.zeros(1), lambda tau: np.zeros((1, 2)),
+        np.full(1, 20.0), np.full(1, 20.0), np.zeros(1), lambda tau: np.zeros((1, 2)), np.zeros(1),
     )  # fmt: skip
     soft = body.real({}, Hidden({"gravity-sag.c": 1e-7}), load, False)
     axis = soft.poses(c, soft.home(1)).rotation[0, :, 2]
