@@ -6,22 +6,27 @@ knows no set-point handshake.
 """
 
 import asyncio
+import struct
 import time
 from collections.abc import Callable
 
 from canopen.objectdictionary import ODVariable
 
+from drivers.canopen.control_frame import Address, ReceivePdo, control_pdo
 from drivers.canopen.link import Device
 from drivers.errors import DriveFault, ProtocolError, Refused, Silence
 
 CONTROLWORD, STATUSWORD, MODE, MODE_DISPLAY = 0x6040, 0x6041, 0x6060, 0x6061
 TARGET_POSITION, ERROR_CODE = 0x607A, 0x603F
+ACTUAL_POSITION, POSITION_WINDOW, HOME_OFFSET = 0x6064, 0x6067, 0x607C
 PROFILE_POSITION, HOMING, CYCLIC_POSITION = 1, 6, 8
 SHUTDOWN, SWITCH_ON, ENABLE, QUICK_STOP, DISABLE_VOLTAGE = 0x06, 0x07, 0x0F, 0x02, 0x00
 FAULT_RESET, NEW_SETPOINT, AT_ONCE = 0x80, 0x10, 0x20
 REACHED, LIMITED, ACKNOWLEDGED, FAILED = 1 << 10, 1 << 11, 1 << 12, 1 << 13
 REFERENCED = 1 << 15
 STATE_DEADLINE_S = 2.0
+BEGIN_DEADLINE_S = 0.5
+"""Wall time in which a drive that begins a motion takes back the bits of an earlier one."""
 POLL_S = 0.002
 
 STATES = (
@@ -85,6 +90,20 @@ class Drive402:
         self.remote = device
         self.name = name
         self.device = device.label
+        self._told: dict[Address, bytes] = {}
+        self._control_pdo: ReceivePdo | None = None
+        self.stopped = False
+        """A stop has overtaken what was under way: only :meth:`enable` gives power again."""
+
+    async def read_control_pdo(self) -> None:
+        """Learn from the drive by which PDO it takes its controlword."""
+        self._control_pdo = await self.remote.call(lambda: control_pdo(self.remote, self._told))
+
+    def control_frame(self, word: int) -> tuple[int, bytes] | None:
+        """The whole frame (COB-ID, data) of a controlword; None if only SDO reaches it."""
+        if self._control_pdo is None:
+            return None
+        return self._control_pdo.frame({**self._told, (CONTROLWORD, 0): struct.pack("<H", word)})
 
     async def read(self, index: int, sub: int = 0) -> int:
         """Read an integer object."""
@@ -98,7 +117,11 @@ class Drive402:
         return int(self._variable(index, sub).decode_raw(self.remote.upload(index, sub)))
 
     def _write(self, index: int, value: int, sub: int = 0) -> None:
-        self.remote.download(index, sub, self._variable(index, sub).encode_raw(value))
+        if index == CONTROLWORD and value & ENABLE == ENABLE and self.stopped:
+            raise self._was_stopped("a stop came between")
+        data = self._variable(index, sub).encode_raw(value)
+        self.remote.download(index, sub, data)
+        self._told[index, sub] = data
 
     def _variable(self, index: int, sub: int) -> ODVariable:
         variable = self.remote.node.object_dictionary.get_variable(index, sub)
@@ -113,7 +136,11 @@ class Drive402:
     # ------------------------------------------------------------ power
 
     async def enable(self, mode: int = CYCLIC_POSITION) -> None:
-        """Set the mode and walk to operation enabled; raises DriveFault, Silence."""
+        """Set the mode and walk to operation enabled; raises DriveFault, Silence.
+
+        Refused if a stop comes between.
+        """
+        self.stopped = False
         await self.set_mode(mode)
         deadline = time.monotonic() + STATE_DEADLINE_S
         while True:
@@ -145,24 +172,34 @@ class Drive402:
         )
 
     async def clear_fault(self) -> None:
-        """Reset a fault (rising edge of bit 7); raises DriveFault if it stays."""
+        """Reset a fault (rising edge of bit 7); raises DriveFault if it stays.
+
+        Drives take their time to do so; the bit stays up until they have.
+        """
         if state_name(await self.read(STATUSWORD)) != "fault":
             return
         await self.write(CONTROLWORD, DISABLE_VOLTAGE)
         await self.write(CONTROLWORD, FAULT_RESET)
+        deadline = time.monotonic() + BEGIN_DEADLINE_S
+        while state_name(await self.read(STATUSWORD)) == "fault":
+            if time.monotonic() > deadline:
+                await self.write(CONTROLWORD, DISABLE_VOLTAGE)
+                raise drive_fault(self.device, await self.read(ERROR_CODE))
+            await asyncio.sleep(POLL_S)
         await self.write(CONTROLWORD, DISABLE_VOLTAGE)
-        if state_name(await self.read(STATUSWORD)) == "fault":
-            raise drive_fault(self.device, await self.read(ERROR_CODE))
 
     async def set_mode(self, mode: int) -> None:
-        """Set the mode of operation and see it in 0x6061."""
+        """Set the mode of operation and see it in 0x6061, which follows in the drive's own time."""
         await self.write(MODE, mode)
-        if await self.read(MODE_DISPLAY) != mode:
-            raise Refused(
-                f"does not take mode of operation {mode}",
-                device=self.device,
-                remedy="Check the supported modes (0x6502) of this drive.",
-            )
+        deadline = time.monotonic() + BEGIN_DEADLINE_S
+        while await self.read(MODE_DISPLAY) != mode:
+            if time.monotonic() > deadline:
+                raise Refused(
+                    f"does not take mode of operation {mode}",
+                    device=self.device,
+                    remedy="Check the supported modes (0x6502) of this drive.",
+                )
+            await asyncio.sleep(POLL_S)
 
     async def wait(
         self, arrived: Callable[[int], bool], timeout: float, what: str, faults: bool = True
@@ -193,18 +230,27 @@ class Drive402:
     def _still_enabled(self, status: int) -> None:
         state = state_name(status)
         if state != "operation enabled":
-            raise Refused(
-                f"the motion was stopped (state {state!r})",
-                device=self.device,
-                remedy="Enable the machine and start again.",
-            )
+            raise self._was_stopped(f"state {state!r}")
+
+    def _was_stopped(self, how: str) -> Refused:
+        return Refused(
+            f"the motion was stopped ({how})",
+            device=self.device,
+            remedy="Enable the machine and start again.",
+        )
 
     # ------------------------------------------------------------ single motion
 
-    async def home(self, timeout: float) -> None:
-        """Run the homing procedure of 0x6098 and wait for its end."""
+    async def home(self, timeout: float, back_to: int = CYCLIC_POSITION) -> None:
+        """Run the homing procedure of 0x6098, wait for its end, and go to mode ``back_to``.
+
+        Raises DriveFault, Refused (stopped meanwhile), Silence.
+        """
         await self._need_enabled()
         await self.set_mode(HOMING)
+        await self.write(CONTROLWORD, ENABLE)
+        await self.write(CONTROLWORD, ENABLE | NEW_SETPOINT)
+        await self._homing_begun()
 
         def attained(status: int) -> bool:
             self._still_enabled(status)
@@ -214,10 +260,40 @@ class Drive402:
                 )
             return bool(status & ACKNOWLEDGED and status & REACHED)
 
-        await self.write(CONTROLWORD, ENABLE | NEW_SETPOINT)
         await self.wait(attained, timeout, "find its reference")
         await self.write(CONTROLWORD, ENABLE)
-        await self.set_mode(CYCLIC_POSITION)
+        await self.set_mode(back_to)
+
+    async def _homing_begun(self) -> None:
+        """Wait until bits 10 and 12 are those of this homing, not of an earlier one.
+
+        A drive that begins takes them back. One that had nothing to do may have them up again
+        before anybody could look: then it stands at its reference.
+        """
+        deadline = time.monotonic() + BEGIN_DEADLINE_S
+        while time.monotonic() < deadline:
+            status = await self.read(STATUSWORD)
+            self._still_enabled(status)
+            if not (status & ACKNOWLEDGED and status & REACHED):
+                return
+            await asyncio.sleep(POLL_S)
+        off = abs(await self.read(ACTUAL_POSITION) - await self.read(HOME_OFFSET))
+        if off > await self.read(POSITION_WINDOW):
+            raise DriveFault(
+                "did not begin to look for its reference: it reports that of an earlier homing",
+                device=self.device,
+                remedy="Look at homing method (0x6098) and reference mark.",
+            )
+
+    async def acknowledge(self, taken: bool) -> None:
+        """Wait until the drive has taken its set-point, or is ready for the next."""
+
+        def so(status: int) -> bool:
+            self._still_enabled(status)
+            return bool(status & ACKNOWLEDGED) == taken
+
+        what = "acknowledge its set-point" if taken else "end the set-point handshake"
+        await self.wait(so, STATE_DEADLINE_S, what)
 
     async def move_to(self, counts: int, timeout: float) -> None:
         """Move alone to ``counts`` (profile position, set-point handshake) and wait."""
@@ -225,13 +301,9 @@ class Drive402:
         await self.set_mode(PROFILE_POSITION)
         await self.write(TARGET_POSITION, counts)
         await self.write(CONTROLWORD, ENABLE | NEW_SETPOINT | AT_ONCE)
-        await self.wait(
-            lambda word: bool(word & ACKNOWLEDGED), STATE_DEADLINE_S, "acknowledge its set-point"
-        )
+        await self.acknowledge(True)
         await self.write(CONTROLWORD, ENABLE)
-        await self.wait(
-            lambda word: not word & ACKNOWLEDGED, STATE_DEADLINE_S, "end the set-point handshake"
-        )
+        await self.acknowledge(False)
 
         def reached(status: int) -> bool:
             self._still_enabled(status)
