@@ -119,6 +119,7 @@ class Site:
     platform_nests: Mapping[str, tuple[float, ...]]
     base_nests: Mapping[str, tuple[float, ...]]
     load: Load | None
+    payload_kg: float | None
     hands: Hands
     limits: Limits
     clock_scale: float
@@ -151,6 +152,7 @@ def site_of(top: TomlTable, source: str, folder: Path) -> Site:
         raise top.wrong(error.what, "machine", remedy=error.remedy) from None
     nests = top.table("nests")
     platform, base = nests.named("platform"), nests.named("base")
+    load, payload_kg = _load(top)
     site = Site(
         source=source,
         data=_standing_alone(top, machine_name, folder),
@@ -161,7 +163,8 @@ def site_of(top: TomlTable, source: str, folder: Path) -> Site:
         tracker=_tracker(top.table("tracker"), len(machine.actuators), folder),
         platform_nests={name: _centre(platform, name) for name in platform},
         base_nests={name: _centre(base, name) for name in base},
-        load=_load(top),
+        load=load,
+        payload_kg=payload_kg,
         hands=_hands(top.table("hands", required=False)),
         limits=_limits(top.table("limits", required=False)),
         clock_scale=_clock(top.table("clock", required=False)),
@@ -276,13 +279,16 @@ def _clock(table: TomlTable) -> float:
     return scale
 
 
-def _load(top: TomlTable) -> Load | None:
+def _load(top: TomlTable) -> tuple[Load | None, float | None]:
+    """What the platform weighs, and the mass of the payload where no device tells it."""
     if not top.has("load"):
-        return None
+        return None, None
     table = top.table("load")
-    load = load_of(table)
+    load, payload_kg = load_of(table), table.optional_number("payload_kg", unit="kg")
+    if payload_kg is not None and payload_kg < 0.0:
+        raise table.wrong(f"payload_kg is {payload_kg}", "payload_kg", remedy="Give its mass, kg")
     table.end()
-    return load
+    return load, payload_kg
 
 
 def site_of_mock(announcement: Mapping[str, Any]) -> Site:

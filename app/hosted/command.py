@@ -1,43 +1,158 @@
-"""From the pose that is wanted to the extensions that are commanded."""
+"""From wanted poses to the extensions that are commanded, everything compensated that was found."""
+
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from app.hosted.parameters import ParameterSet
 from calib.arrays import Array
+from calib.command import Commands, History, Identified, Surroundings, commands_for
+from calib.errors import BadInput
 from calib.mechanism.description import Machine
-from calib.mechanism.limits import violations
-from calib.mechanism.solve import inverse
+from calib.runs.header import Load
 from drivers.errors import Refused
 
+AT_REFERENCE = {"structure_temp_C": 20.0, "payload_kg": 0.0, "delay_s": 0.0}
+"""Where an effect is applied whose channel nobody tells."""
+BETWEEN_S = 20.0
+"""Machine seconds from one pose to the next, as long as none was timed."""
 
-def commanded_extension(
-    machine: Machine, chosen: ParameterSet, pose: tuple[float, ...], device: str
-) -> Array:
-    """Extensions (n,), mm or rad, that bring the platform to a pose.
+
+class Commander:
+    """Computes commands with a parameter set, the conditions as told, and what was sent before.
 
     Parameters
     ----------
-    pose : tuple of float
-        Task coordinates, mm and rad.
-
-    Raises
-    ------
-    Refused
-        For what is no pose, cannot be reached, or passes a limit.
+    machine : Machine
+    chosen : ParameterSet
+    load : Load or None
+        What the machine carries, as the site file says.
+    clock : callable
+        Machine seconds; never goes back.
     """
-    wanted = len(machine.task.coordinates)
-    if len(pose) != wanted or not np.all(np.isfinite(pose)):
-        raise Refused(
-            f"{pose} is no pose: {wanted} finite numbers are", device=device, remedy="Command one"
+
+    def __init__(
+        self,
+        machine: Machine,
+        chosen: ParameterSet,
+        load: Load | None,
+        clock: Callable[[], float],
+    ) -> None:
+        self.chosen = chosen
+        self._machine = machine
+        self._load = load
+        self._clock = clock
+        self.left: tuple[str, ...] = ()
+        """What the last command could not compensate as it should, and why, in sentences."""
+        self._told: dict[str, float] = {}
+        self._history: History | None = None
+        self._travel_s = BETWEEN_S
+        self._whole = chosen.identified(machine, load)
+
+    def with_set(self, chosen: ParameterSet) -> "Commander":
+        """The same machine, conditions and past, with another parameter set."""
+        other = Commander(self._machine, chosen, self._load, self._clock)
+        other._told, other._history, other._travel_s = self._told, self._history, self._travel_s
+        return other
+
+    def conditions(self, channels: Mapping[str, float]) -> None:
+        """Take state readings for the commands to come; what is not finite is not told."""
+        self._told = {name: v for name, v in channels.items() if np.isfinite(v)}
+
+    def stands_at(self, q: tuple[float, ...]) -> None:
+        """Hear where the device was last sent: after a stop, or before the first command.
+
+        Parameters
+        ----------
+        q : tuple of float
+            Actuator coordinates by the drawing; nan where it is not known.
+        """
+        extension = self._machine.extension(np.array(q)[:, None])[:, 0]
+        if not np.all(np.isfinite(extension)):
+            return
+        if self._history is None:
+            self._history = History.at(extension, self._clock())
+        elif np.any(np.abs(extension - self._history.extension[:, -1]) > self._whole.motion):
+            self._history = self._history.then(extension, self._clock())
+
+    def sent(self, q: tuple[float, ...]) -> None:
+        """Remember a command that was accepted."""
+        self.stands_at(q)
+        if self._history is not None:
+            self._history = self._history.condensed(
+                self._whole.motion, whole_path=self._whole.remembers_path
+            )
+
+    def arrived(self) -> None:
+        """Remember how long the last move took."""
+        if self._history is not None and self._history.count > 1:
+            self._travel_s = max(self._clock() - float(self._history.time_s[-1]), 0.0)
+
+    def extension(self, pose: Sequence[float]) -> Array:
+        """Extensions (n,), mm or rad, that bring the platform to task coordinates.
+
+        Raises
+        ------
+        Refused
+            For what is no pose, cannot be reached, or passes a limit.
+        """
+        commands = self.commands([tuple(pose)])
+        if why := commands.refused[0]:
+            raise Refused(f"the pose is refused: {why}", remedy="Choose another pose")
+        found: Array = commands.extension[:, 0]
+        return found
+
+    def commands(self, poses: Sequence[Sequence[float]]) -> Commands:
+        """Commands for poses one after the other; nothing is remembered.
+
+        Raises
+        ------
+        Refused
+            For what is no pose.
+        """
+        count = len(self._machine.task.coordinates)
+        for pose in poses:
+            if len(pose) != count or not np.all(np.isfinite(pose)):
+                raise Refused(
+                    f"{tuple(pose)} is no pose: {count} finite numbers are", remedy="Command one"
+                )
+        identified, channels, self.left = self._in_these_conditions()
+        begins = self._clock() + self._travel_s
+        times: Array = begins + (self._travel_s or BETWEEN_S) * np.arange(len(poses), dtype=float)
+        around = Surroundings(channels, times)
+        history = self._history or History.at_home(self._machine)
+        try:
+            return commands_for(identified, np.array(poses, float).T, around, history)
+        except BadInput as error:
+            raise Refused(error.what, remedy=error.remedy) from error
+
+    def _in_these_conditions(self) -> tuple[Identified, dict[str, float], tuple[str, ...]]:
+        """The machine, every channel that its effects need, and what nobody tells.
+
+        An effect whose channel nobody tells is applied at its reference; one that has none is
+        left out.
+        """
+        whole, channels, said = self._whole, dict(self._told), []
+        wanted = dict.fromkeys(
+            name
+            for found in whole.effects
+            for name in (*found.needs, *found.effect.depends)
+            if name in found.needs or name == "payload_kg"
         )
-    parameters = machine.vector(chosen.values)
-    closed = inverse(machine, np.array(pose, float)[:, None], parameters)
-    for violation in violations(machine, closed):
-        raise Refused(
-            f"the pose passes a limit: {violation.what}"
-            + (f" = {violation.value:.4g} {violation.unit}" if violation.unit else ""),
-            device=device,
-            remedy="Choose another pose",
-        )
-    extension: Array = closed.extension[:, 0]
-    return extension
+        idle = set()
+        for name in wanted:
+            if name in channels:
+                continue
+            who = [f.effect.id for f in whole.effects if name in (*f.needs, *f.effect.depends)]
+            if name in AT_REFERENCE:
+                channels[name] = AT_REFERENCE[name]
+                said.append(
+                    f"nobody tells {name}: {', '.join(who)} compensated for {AT_REFERENCE[name]:g}"
+                )
+            else:
+                idle |= set(who)
+                said.append(f"nobody tells {name}: {', '.join(who)} not compensated")
+        if idle:
+            kept = tuple(found for found in whole.effects if found.effect.id not in idle)
+            whole = Identified(whole.machine, whole.parameters, kept, whole.load)
+        return whole, channels, tuple(said)

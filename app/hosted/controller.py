@@ -1,17 +1,17 @@
 """A motion controller whose parameters and mathematics are the host's."""
 
 import asyncio
+import time
 from collections.abc import Callable, Mapping, Sequence
 
-import numpy as np
-
 from app.errors import GateRefused
-from app.hosted.command import commanded_extension
+from app.hosted.command import Commander
 from app.hosted.means import Means
 from app.hosted.parameters import DEVICE, ParameterSet
 from app.hosted.store import HostStore
 from calib.arrays import Array
 from calib.mechanism.description import Machine
+from calib.runs.header import Load
 from drivers.errors import ParameterError, Refused
 from drivers.interface import Alarm, ControllerCan, ControllerState
 
@@ -26,39 +26,72 @@ class HostedController:
         What moves the machine; closed with this.
     store : HostStore
         Open; closed with this.
+    load : Load, optional
+        What the machine carries; without one there is no weight.
+    clock : callable, optional
+        Machine seconds, for effects that remember.
     """
 
-    def __init__(self, machine: Machine, means: Means, store: HostStore) -> None:
+    def __init__(
+        self,
+        machine: Machine,
+        means: Means,
+        store: HostStore,
+        load: Load | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self.machine = machine
         self._means = means
         self._store = store
         self.identity = means.device.identity
         can = means.device.can
         self.can = ControllerCan(parameters=True, homes=can.homes, channels=can.channels)
-        self._chosen: ParameterSet | None = None
+        self._hooks: list[Callable[[Alarm], None]] = []
+        self._said: tuple[str, ...] = ()
+        drawn = ParameterSet.nominal(machine)
+        self._commander = Commander(machine, drawn, load, clock)
         self._broken: ParameterError | None = None
         self._load()
 
     def _load(self) -> None:
         """Take the stored set; one that cannot be used blocks motion, not the way back."""
-        self._chosen = self._broken = None
         try:
-            _, self._chosen = self._store.load()
+            _, chosen = self._store.load()
         except ParameterError as error:
             self._broken = error
+        else:
+            self._use(chosen)
+
+    def _use(self, chosen: ParameterSet) -> None:
+        self._commander = self._commander.with_set(chosen)
+        self._broken = None
 
     @property
     def chosen(self) -> ParameterSet:
         """The set in use; raises :class:`ParameterError` while the store cannot be used."""
-        if self._chosen is None:
-            assert self._broken is not None
+        if self._broken is not None:
             raise self._broken
-        return self._chosen
+        return self._commander.chosen
+
+    def told(self, channels: Mapping[str, float]) -> None:
+        """Hear state readings (``payload_kg``, ``structure_temp_C`` ...) for the next commands."""
+        self._commander.conditions(channels)
+
+    def _say_what_is_left(self) -> None:
+        """Tell what a command did not compensate as it should, whenever that changes."""
+        left = self._commander.left
+        if left != self._said:
+            self._said = left
+            for what in left:
+                alarm = Alarm(self.identity.kind, what, "Its error stays until somebody does")
+                for hook in tuple(self._hooks):
+                    hook(alarm)
 
     # what moves
 
     def on_alarm(self, callback: Callable[[Alarm], None]) -> None:
-        """Call ``callback`` for everything that the device says unasked."""
+        """Call ``callback`` for what the device says unasked, and what is not compensated."""
+        self._hooks.append(callback)
         self._means.device.on_alarm(callback)
 
     def check(self) -> None:
@@ -87,11 +120,14 @@ class HostedController:
 
     async def move_to_pose(self, pose: tuple[float, ...]) -> tuple[float, ...]:
         """Command a pose with the set in use and start moving; returns q as it was sent."""
-        chosen = self.chosen
-        extension = await asyncio.to_thread(
-            commanded_extension, self.machine, chosen, pose, self.identity.kind
-        )
-        return await self._means.send(extension)
+        _ = self.chosen
+        state = await self.state()
+        self._commander.stands_at(tuple(actuator.target for actuator in state.actuators))
+        extension = await asyncio.to_thread(self._commander.extension, pose)
+        self._say_what_is_left()
+        q = await self._means.send(extension)
+        self._commander.sent(q)
+        return q
 
     async def would_send(self, poses: Sequence[tuple[float, ...]], labels: Sequence[str]) -> Array:
         """Extensions (n, N) that these poses would be commanded with, one after the other.
@@ -103,22 +139,21 @@ class HostedController:
         GateRefused
             Naming the pose that cannot be commanded.
         """
-        chosen = self.chosen
-        columns = []
-        for label, pose in zip(labels, poses, strict=True):
-            try:
-                columns.append(commanded_extension(self.machine, chosen, pose, ""))
-            except Refused as error:
+        _ = self.chosen
+        commands = await asyncio.to_thread(self._commander.commands, poses)
+        for label, why in zip(labels, commands.refused, strict=True):
+            if why:
                 raise GateRefused(
-                    f"pose {label}: {error.what}",
+                    f"pose {label}: {why}",
                     remedy="Leave that pose out or choose poses with pkmcal poses; nothing has "
                     "moved",
-                ) from error
-        return np.stack(columns, axis=1)
+                )
+        return commands.extension
 
     async def wait_arrived(self, timeout: float) -> None:
         """Wait until everything that moves has reached its target."""
         await self._means.device.wait_arrived(timeout)
+        self._commander.arrived()
 
     async def stop(self) -> None:
         """Quick stop."""
@@ -147,18 +182,25 @@ class HostedController:
         Refused
             While a drive has power, or for a set that the host cannot compute with.
         """
-        held = self._chosen.values if self._chosen is not None else {}
-        own = self._chosen.own if self._chosen is not None else {}
-        await self._take(ParameterSet({**held, **values}, own))
+        held = {} if self._broken is not None else self.chosen.values
+        own = {} if self._broken is not None else self.chosen.own
+        await self.replace_parameters(ParameterSet({**held, **values}, own))
 
-    async def _take(self, chosen: ParameterSet) -> None:
+    async def replace_parameters(self, chosen: ParameterSet) -> None:
+        """Use a whole set instead, until it is stored or the program ends.
+
+        Raises
+        ------
+        Refused
+            While a drive has power, or for a set that the host cannot compute with.
+        """
         if (await self.state()).enabled:
             raise Refused(
                 "parameters are not changed while a drive has power",
                 device=DEVICE,
                 remedy="Take the power off the drives first",
             )
-        self._chosen, self._broken = chosen.checked(self.machine), None
+        self._use(chosen.checked(self.machine))
 
     async def parameter_checksum(self) -> int:
         """CRC-32 over the set in use."""

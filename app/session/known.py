@@ -10,12 +10,13 @@ import math
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
 from app.files.site import Site
 from app.files.text import read_text
+from app.hosted.controller import HostedController
 from app.ownership import state_folder
 from calib.errors import BadInput
 from drivers.errors import ParameterError
@@ -26,10 +27,14 @@ FORMAT = "pkm-parameters/1"
 
 @dataclass(frozen=True)
 class Held:
-    """Parameters as the controller answered them, with its checksum (CRC-32)."""
+    """Parameters as the controller answered them, with its checksum (CRC-32).
+
+    ``own`` holds the texts of the operator's own effects among them, by id: a host has such.
+    """
 
     values: dict[str, float]
     checksum: int
+    own: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -43,6 +48,7 @@ class Snapshot:
     identity: Identity
     checksum: int
     values: dict[str, float]
+    own: dict[str, str] = field(default_factory=dict)
 
     def to_json(self) -> str:
         """Render the snapshot; numbers are written so that they read back bit for bit."""
@@ -57,6 +63,7 @@ class Snapshot:
                 raise ValueError("another format")
             data["identity"] = Identity(**data["identity"])
             data["values"] = {str(k): float(v) for k, v in data["values"].items()}
+            data["own"] = {str(k): str(v) for k, v in data.get("own", {}).items()}
             return Snapshot(**data)
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise BadInput(f"not a parameter snapshot ({error})", place=source) from error
@@ -92,6 +99,7 @@ class Snapshots:
             self._identity,
             held.checksum,
             dict(held.values),
+            dict(held.own),
         )
         _write_surely(self.path(snapshot), snapshot.to_json())
         return snapshot
@@ -121,7 +129,8 @@ class Snapshots:
         if not path.is_file():
             return None
         data = json.loads(read_text(path))
-        return Held({k: float(v) for k, v in data["values"].items()}, int(data["checksum"]))
+        values = {k: float(v) for k, v in data["values"].items()}
+        return Held(values, int(data["checksum"]), dict(data.get("own", {})))
 
     def latch_unknown(self, why: str) -> None:
         """Remember that nobody knows what the controller holds; blocks motion until undone."""
@@ -177,7 +186,12 @@ async def read_held(site: Site, controller: MotionController) -> Held:
             device="controller",
             remedy="Make sure that nothing else writes to the controller, then try again",
         )
-    return Held(values, after)
+    return Held(values, after, own_effects_in(controller))
+
+
+def own_effects_in(controller: MotionController) -> dict[str, str]:
+    """Texts of the operator's own effects that are compensated, by id; only a host has any."""
+    return dict(controller.chosen.own) if isinstance(controller, HostedController) else {}
 
 
 async def compare_with_known(
@@ -203,12 +217,13 @@ async def compare_with_known(
     held = await read_held(site, controller)
     expected = Held(dict(trial), held.checksum) if trial else snapshots.expected()
     wanted = expected.values if expected else _nominal(site, held.values)
-    different = [name for name in held.values if held.values[name] != wanted.get(name)]
+    names = dict.fromkeys((*held.values, *wanted))
+    different = [name for name in names if held.values.get(name) != wanted.get(name)]
     if different:
         name = different[0]
         raise ParameterError(
-            f"holds {name} = {held.values[name]!r} where the model expects {wanted.get(name)!r} "
-            f"({len(different)} of {len(held.values)} parameters differ)",
+            f"holds {name} = {held.values.get(name)!r} where the model expects "
+            f"{wanted.get(name)!r} ({len(different)} of {len(names)} parameters differ)",
             device="controller",
             remedy="Bring the known set back with pkmcal undo, or take what it holds as known: "
             "pkmcal undo --accept",

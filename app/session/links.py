@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import cast
 
+from app.clock import Clock
 from app.devices import kind_named
 from app.files.site import Site
 from app.hosted.controller import HostedController
@@ -47,7 +48,7 @@ def hosted(site: Site, means: ByMotors | ByPoses) -> HostedController:
     store = HostStore(folder, site.machine)
     store.open()
     try:
-        return HostedController(site.machine, means, store)
+        return HostedController(site.machine, means, store, site.load, Clock(site.clock_scale).now)
     except BaseException:
         store.close()
         raise

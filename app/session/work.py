@@ -44,6 +44,8 @@ class Memory:
     """Label of the pose where the machine stands; None: ask the controller first."""
     q: tuple[float, ...] = ()
     arrived_s: float = 0.0
+    delay_s: float = 0.0
+    """Between the last arrival and the reading after it: how long it is to settle next time."""
     settled: bool = False
     channels: tuple[float, dict[str, float]] = field(default_factory=lambda: (0.0, {}))
     """When the channels were last asked for (machine s), and the answer."""

@@ -12,9 +12,9 @@ from app.session import events as ev
 from app.session.known import Snapshot, compare_with_known
 from app.session.session import Session
 from app.session.station import Station
-from app.writeback.gates import Gates, gates_of_proposal
-from app.writeback.procedure import WriteBack, accept, undo
-from app.writeback.proposal import Proposal, propose
+from app.writeback.gates import Gates
+from app.writeback.procedure import WriteBack, accept, judged, undo
+from app.writeback.proposal import Proposal
 from app.writeback.transfer import snapshots_of
 from calib.errors import BadInput
 from calib.pose_error import Summary
@@ -59,9 +59,7 @@ class Corrections:
 
         def judge() -> Comparison:
             fit = read_fit(model)
-            proposal = propose(station.site.machine, fit, held.values)
-            machine, gates = station.site.machine, Gates.with_limits({})
-            checked = gates_of_proposal(gates, machine, fit, proposal, held.values)
+            proposal, checked = judged(station.site, Gates.with_limits({}), fit, held)
             return Comparison(model, proposal, tuple(checked))
 
         # Arithmetic goes beside the event loop: stop key and drivers must not wait for it.

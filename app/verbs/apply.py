@@ -142,6 +142,8 @@ def table(proposal: Proposal) -> str:
     head = ("parameter", "old", "new", "change", "sigma", "in sigmas", "unit", "")
     lines = [answer.table(head, rows)] if rows else ["nothing to change"]
     lines += [f"not written: {name}: {why}" for name, why in proposal.left_out.items()]
+    effects = dict.fromkeys(name.split(".")[0] for name in proposal.given_up)
+    lines += [f"no longer compensated: {effect}: the fit does not have it" for effect in effects]
     return "\n".join(lines)
 
 

@@ -5,20 +5,22 @@ Each gate is a number against a limit; limits can be changed by name, knowingly.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from app.errors import GateRefused
 from app.files.fits import SavedFit
+from app.hosted.command import AT_REFERENCE, BETWEEN_S
 from app.session.events import GateChecked
 from app.writeback.proposal import Proposal
 from calib.arrays import Array
+from calib.command import History, Identified, Surroundings, commands_for, standpoint
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.limits import violations
-from calib.mechanism.rigid import pose_difference
+from calib.mechanism.rigid import Poses, pose_difference
 from calib.mechanism.solve import Configuration, forward, inverse
 from calib.pose_error import Summary
 from calib.poses import verification_poses
@@ -66,8 +68,21 @@ def refuse_if_any(checked: list[GateChecked], remedy: str) -> None:
         raise GateRefused("; ".join(failed), remedy=remedy)
 
 
+@dataclass(frozen=True)
+class HostedSets:
+    """Where the host computes the motion: the machine by the set in use and by the new one."""
+
+    old: Identified
+    new: Identified
+
+
 def gates_of_proposal(
-    gates: Gates, machine: Machine, fit: SavedFit, proposal: Proposal, held: Mapping[str, float]
+    gates: Gates,
+    machine: Machine,
+    fit: SavedFit,
+    proposal: Proposal,
+    held: Mapping[str, float],
+    hosted: HostedSets | None = None,
 ) -> list[GateChecked]:
     """Everything that can be judged before the controller is touched."""
     new_values = proposal.values
@@ -92,18 +107,26 @@ def gates_of_proposal(
     checked.append(gates.check("holdout", ratio, "", says))
     old = machine.vector({p.name: held[p.name] for p in machine.parameters})
     new = machine.vector({p.name: new_values[p.name] for p in machine.parameters})
-    return checked + _over_workspace(gates, machine, fit, old, new)
+    return checked + _over_workspace(gates, machine, fit, old, new, hosted)
 
 
 def _over_workspace(
-    gates: Gates, machine: Machine, fit: SavedFit, old: Array, new: Array
+    gates: Gates,
+    machine: Machine,
+    fit: SavedFit,
+    old: Array,
+    new: Array,
+    hosted: HostedSets | None,
 ) -> list[GateChecked]:
     """Limits, condition and predicted accuracy over the verification grid."""
     poses = verification_poses(machine).poses
     with_old = inverse(machine, poses, old)
     with_new = inverse(machine, poses, new)
-    outside = len({v.pose for v in violations(machine, with_old, _named(machine, old))})
-    outside += len({v.pose for v in violations(machine, with_new, _named(machine, new))})
+    outside = 0
+    for closed, held in ((with_old, old), (with_new, new)):
+        # Coordinates of a host refer to the drawing, those of a controller to what it holds.
+        reference = {} if hosted else _named(machine, held)
+        outside += len({v.pose for v in violations(machine, closed, reference)})
     says = f"of {poses.count} poses outside a limit, with the old or the new parameters"
     checked = [gates.check("workspace", outside, "", says)]
     if outside:
@@ -115,12 +138,33 @@ def _over_workspace(
     says = "predicted RMS position error with the new parameters"
     checked.append(gates.check("uncertainty", spread, "um", says))
     # What the new model says of poses commanded with the old parameters.
-    went = forward(machine, with_old.extension, new, with_new)
-    off = pose_difference(poses, went.poses)[:3]
+    went = (
+        forward(machine, with_old.extension, new, with_new).poses
+        if hosted is None
+        else _went_by_host(hosted, poses)
+    )
+    off = pose_difference(poses, went)[:3]
     before = 1e3 * float(np.sqrt(np.mean(np.sum(off * off, axis=0))))
     says = f"predicted error after over before ({before:.1f} um)"
     checked.append(gates.check("gain", spread / max(before, 1e-9), "", says))
     return checked
+
+
+def _went_by_host(hosted: HostedSets, poses: Poses) -> Poses:
+    """Where the new model puts poses, one after the other, that the host commands by the old.
+
+    Effects are taken at their references; those that depend on anything else are left out.
+    """
+    identified = [_at_reference(one) for one in (hosted.old, hosted.new)]
+    around = Surroundings(AT_REFERENCE, BETWEEN_S * np.arange(poses.count, dtype=np.float64))
+    commands = commands_for(identified[0], poses, around)
+    home = History.at_home(identified[1].machine)
+    return standpoint(identified[1], commands.extension, around, home).poses
+
+
+def _at_reference(identified: Identified) -> Identified:
+    kept = [found for found in identified.effects if set(found.needs) <= set(AT_REFERENCE)]
+    return replace(identified, effects=tuple(kept))
 
 
 def _named(machine: Machine, vector: Array) -> dict[str, float]:

@@ -5,6 +5,7 @@ fails as well, the parameters are unknown and motion stays blocked until a known
 """
 
 import asyncio
+import math
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,15 +13,17 @@ from pathlib import Path
 from app.errors import GateRefused, StoppedByOperator
 from app.files.fits import SavedFit
 from app.files.pose_table import Pose
-from app.session.events import Stage, WriteBackStage
+from app.files.site import Site
+from app.hosted.parameters import ParameterSet
+from app.session.events import GateChecked, Stage, WriteBackStage
 from app.session.known import Held, Snapshot, compare_with_known
 from app.session.plans import PlanOptions, measure_plan, order_for
 from app.session.session import Session
 from app.session.station import Station
 from app.verification import Verification, judge
-from app.writeback.gates import Gates, gates_of_check, gates_of_proposal, refuse_if_any
+from app.writeback.gates import Gates, HostedSets, gates_of_check, gates_of_proposal, refuse_if_any
 from app.writeback.proposal import Proposal, propose
-from app.writeback.transfer import keep, prove, snapshots_of, write_volatile
+from app.writeback.transfer import Wanted, keep, prove, snapshots_of, write_volatile
 from calib.pose_error import Summary
 from calib.poses import verification_poses
 from drivers.errors import DeviceError, ParameterError, Refused
@@ -84,8 +87,7 @@ class WriteBack:
         """
         site = self.station.site
         held = await compare_with_known(site, self.station.controller)
-        proposal = propose(site.machine, self.fit, held.values)
-        checked = gates_of_proposal(self.gates, site.machine, self.fit, proposal, held.values)
+        proposal, checked = judged(site, self.gates, self.fit, held)
         for gate in checked:
             self.station.observers.tell(gate)
         refuse_if_any(checked, "Nothing was written. Measure more, or fit again")
@@ -109,12 +111,12 @@ class WriteBack:
         self._stage("snapshot", f"{len(held.values)} parameters in {snapshots.path(snapshot)}")
         before = await self._measure("before", held.values)
         after = before
-        wanted = {**held.values, **proposal.values}
+        wanted = Wanted(proposal.over(held.values), proposal.own)
         try:
             self._stage("write", f"{len(proposal.changes)} values into volatile memory")
             await write_volatile(self.station, wanted)
             self._stage("read-back", "every value reads back bit for bit")
-            after = await self._measure("after", wanted)
+            after = await self._measure("after", wanted.values)
             checked = gates_of_check(
                 self.gates, before.measured, after.measured, after.noise_peak_um
             )
@@ -195,6 +197,20 @@ class WriteBack:
         self.station.observers.tell(WriteBackStage(stage, says))
 
 
+def judged(
+    site: Site, gates: Gates, fit: SavedFit, held: Held
+) -> tuple[Proposal, list[GateChecked]]:
+    """What a fit would change in what the controller holds, and every gate before writing."""
+    machine, hosted = site.machine, site.controller.hosted
+    proposal = propose(machine, fit, held.values, hosted=hosted)
+    sets = None
+    if hosted and all(math.isfinite(value) for value in proposal.values.values()):
+        old = ParameterSet(held.values, held.own)
+        new = ParameterSet(proposal.over(held.values), proposal.own)
+        sets = HostedSets(*(one.identified(machine, site.load) for one in (old, new)))
+    return proposal, gates_of_proposal(gates, machine, fit, proposal, held.values, sets)
+
+
 async def _put_back(station: Station, snapshot: Snapshot, *, stored: bool) -> None:
     """Write a snapshot back; for good as well, if the new set may have been stored.
 
@@ -202,14 +218,15 @@ async def _put_back(station: Station, snapshot: Snapshot, *, stored: bool) -> No
     stored is loaded, and must be the snapshot.
     """
     await station.safe_stop()
-    await write_volatile(station, snapshot.values)
+    wanted = Wanted(snapshot.values, snapshot.own)
+    await write_volatile(station, wanted)
     if not stored:
         return
     try:
-        await keep(station, snapshot.values)
+        await keep(station, wanted)
     except Refused:
         await station.controller.reload_parameters()
-        await prove(station, snapshot.values, "as it is stored")
+        await prove(station, wanted, "as it is stored")
 
 
 async def undo(station: Station, snapshot: Snapshot, why: str) -> Snapshot:
@@ -226,16 +243,17 @@ async def undo(station: Station, snapshot: Snapshot, why: str) -> Snapshot:
     snapshots = snapshots_of(station)
     tell = station.observers.tell
     try:
-        now = await prove(station, {}, "before undoing")
+        now = await prove(station, None, "before undoing")
         saved = snapshots.save(now, f"before {why}")
         tell(WriteBackStage("snapshot", f"what it holds now is set {saved.number}"))
     except ParameterError as error:
         tell(WriteBackStage("snapshot", f"what it holds cannot be saved: {error.what}"))
     try:
         tell(WriteBackStage("write", f"set {snapshot.number}"))
-        await write_volatile(station, snapshot.values)
+        wanted = Wanted(snapshot.values, snapshot.own)
+        await write_volatile(station, wanted)
         tell(WriteBackStage("store", "into memory that survives a power cycle"))
-        kept = await keep(station, snapshot.values)
+        kept = await keep(station, wanted)
     except DeviceError as error:
         snapshots.latch_unknown(f"undo to set {snapshot.number} failed: {error.what}")
         raise
@@ -247,7 +265,7 @@ async def undo(station: Station, snapshot: Snapshot, why: str) -> Snapshot:
 async def accept(station: Station) -> Snapshot:
     """Take what the controller holds as known, knowingly."""
     snapshots = snapshots_of(station)
-    held = await prove(station, {}, "to accept it")
+    held = await prove(station, None, "to accept it")
     saved = snapshots.save(held, "accepted as it was found")
     snapshots.expect(held)
     return saved

@@ -3,17 +3,25 @@
 Effects of the *measurement* are never written. Of the machine effects a controller can take those
 for which it has compensation values. What was fitted is what was left beside the values that it
 used while the run was taken, so the two are added: writing a fit twice writes the same values.
+
+Where the host computes the motion it takes the whole model: every effect of the machine, the
+operator's own formulas on actuators with their texts. Its runs hold what was sent, so a fit finds
+the whole of each effect; what the fit does not have is no longer compensated.
 """
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import PurePath
 
 from app.files.fits import SavedFit
+from app.hosted.parameters import effect_of
+from calib.command.identified import commandable
 from calib.effects import effect_named
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
+
+NOT_OF_THE_MACHINE = "no effect of the machine that is known here; never written"
 
 
 @dataclass(frozen=True)
@@ -39,40 +47,46 @@ class Proposal:
 
     changes: tuple[Change, ...]
     left_out: Mapping[str, str]
+    own: Mapping[str, str] = field(default_factory=dict)
+    """Texts of the operator's own effects among the values, by id."""
+    given_up: tuple[str, ...] = ()
+    """Names that are held and that the whole model does not have: they are taken out."""
 
     @property
     def values(self) -> dict[str, float]:
         """What would be written."""
         return {change.name: change.new for change in self.changes}
 
+    def over(self, held: Mapping[str, float]) -> dict[str, float]:
+        """The whole set after writing, from the one that is held."""
+        kept = {name: value for name, value in held.items() if name not in self.given_up}
+        return {**kept, **self.values}
 
-def propose(machine: Machine, fit: SavedFit, held: Mapping[str, float]) -> Proposal:
+
+def propose(
+    machine: Machine, fit: SavedFit, held: Mapping[str, float], *, hosted: bool = False
+) -> Proposal:
     """Compare a fit with what the controller holds.
+
+    Parameters
+    ----------
+    hosted : bool
+        Whether the host computes the motion, and takes the whole model.
 
     Raises
     ------
     BadInput
         If the fit is of another machine, or lacks a parameter of this one.
     """
-    if fit.machine and not _same_machine(fit.machine, machine):
-        raise BadInput(
-            f'a fit of the machine "{fit.machine}", the site has "{machine.name}"',
-            place=fit.source,
-            remedy="Fit runs of this machine",
-        )
-    missing = [p.name for p in machine.parameters if p.name not in fit.estimates]
-    if missing:
-        raise BadInput(
-            f"{len(missing)} parameters are not in the fit, the first is {missing[0]}",
-            place=fit.source,
-            remedy="Fit all parameters together: they are correlated",
-        )
+    _check_whole(machine, fit)
     changes = [_change(fit, p.name, held, 0.0) for p in machine.parameters]
+    if hosted:
+        return _whole_model(machine, fit, held, changes)
     left_out: dict[str, str] = {}
     for effect in fit.effects:
         found = [name for name in fit.estimates if name.startswith(f"{effect}.")]
         if not _of_the_machine(effect, machine):
-            left_out[effect] = "no effect of the machine that is known here; never written"
+            left_out[effect] = NOT_OF_THE_MACHINE
         elif fit.compensation is None and any(held[n] != 0.0 for n in held if n.startswith(effect)):
             left_out[effect] = (
                 "the file does not say what the controller compensated when the run was taken; "
@@ -86,6 +100,58 @@ def propose(machine: Machine, fit: SavedFit, held: Mapping[str, float]) -> Propo
         else:
             left_out[effect] = "the controller has no compensation for it; its error stays"
     return Proposal(tuple(changes), left_out)
+
+
+def _whole_model(
+    machine: Machine, fit: SavedFit, held: Mapping[str, float], changes: list[Change]
+) -> Proposal:
+    """Every effect of the machine; what is held beyond that is given up.
+
+    Raises
+    ------
+    BadInput
+        If the runs were taken with a controller that compensated something itself: the fit has
+        what was left beside that, and a host has nothing to leave it beside.
+    """
+    used = {name: value for name, value in (fit.compensation or {}).items() if value != 0.0}
+    if used:
+        raise BadInput(
+            f"a controller compensated {next(iter(used))} while the runs were taken; the fit has "
+            "what was left beside that",
+            place=fit.source,
+            remedy="Fit runs that were taken with the motion computed here",
+        )
+    left_out: dict[str, str] = {}
+    own: dict[str, str] = {}
+    for identifier in fit.effects:
+        effect = effect_of(identifier, machine, fit.own)
+        if not commandable(effect):
+            left_out[identifier] = NOT_OF_THE_MACHINE
+            continue
+        names = [name for name in fit.estimates if name.startswith(f"{identifier}.")]
+        changes += [_change(fit, name, held, 0.0) for name in names]
+        if identifier in fit.own:
+            own[identifier] = fit.own[identifier]
+    written = {change.name for change in changes}
+    given_up = tuple(name for name in held if name not in written)
+    return Proposal(tuple(changes), left_out, own, given_up)
+
+
+def _check_whole(machine: Machine, fit: SavedFit) -> None:
+    """Refuse a fit of another machine, or of a part of its parameters."""
+    if fit.machine and not _same_machine(fit.machine, machine):
+        raise BadInput(
+            f'a fit of the machine "{fit.machine}", the site has "{machine.name}"',
+            place=fit.source,
+            remedy="Fit runs of this machine",
+        )
+    missing = [p.name for p in machine.parameters if p.name not in fit.estimates]
+    if missing:
+        raise BadInput(
+            f"{len(missing)} parameters are not in the fit, the first is {missing[0]}",
+            place=fit.source,
+            remedy="Fit all parameters together: they are correlated",
+        )
 
 
 def _same_machine(said: str, machine: Machine) -> bool:
@@ -106,7 +172,7 @@ def _change(fit: SavedFit, name: str, held: Mapping[str, float], add_to: float) 
     new = found.value + add_to
     if name.startswith("backlash."):
         new = max(new, 0.0)  # lost motion is never negative; below zero it is noise
-    return Change(name, held[name], new, found.sigma, found.unit, found.identified)
+    return Change(name, held.get(name, 0.0), new, found.sigma, found.unit, found.identified)
 
 
 def _cyclic(fit: SavedFit, held: Mapping[str, float], left_out: dict[str, str]) -> list[Change]:

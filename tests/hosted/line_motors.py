@@ -5,27 +5,94 @@ Lines: ``ON``, ``OFF``, ``GO q1 q2 ...``, ``HALT``, ``AT?`` -> state; every line
 
 import asyncio
 import contextlib
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from time import monotonic
+from typing import Any, Protocol
 
 from drivers.errors import DeviceError, LinkLost, Refused, Silence
 from drivers.interface import ActuatorState, Alarm, ControllerCan, ControllerState, Identity
+from drivers.kind import Kind, Setting, Surroundings
+from mocks.physics.motion import LegMotion
 
 SPEED = 200.0
+MACHINE_SPEED = 5.0
 ANSWER_S = 2.0
 
 
-class LineServer:
-    """The device: motors that move straight to where they are sent, with a payload and a sensor."""
+class Axes(Protocol):
+    """What stands behind the line; q in the order and units of the machine file."""
 
-    def __init__(self, home: Sequence[float], limits: Sequence[tuple[float, float]]) -> None:
-        self.start = self.goal = [float(q) for q in home]
+    def at(self) -> list[float]: ...
+
+    def goal(self) -> list[float]: ...
+
+    def moving(self) -> bool: ...
+
+    def go(self, goal: list[float]) -> None: ...
+
+    def halt(self) -> None: ...
+
+
+class BareAxes:
+    """Motors that move straight to where they are sent, and move nothing else."""
+
+    def __init__(self, home: Sequence[float]) -> None:
+        self._start = self._goal = [float(q) for q in home]
+        self._began = self._lasts = 0.0
+
+    def at(self) -> list[float]:
+        share = min((monotonic() - self._began) / self._lasts, 1.0) if self._lasts else 1.0
+        return [a + share * (b - a) for a, b in zip(self._start, self._goal, strict=True)]
+
+    def goal(self) -> list[float]:
+        return self._goal
+
+    def moving(self) -> bool:
+        return self.at() != self._goal
+
+    def go(self, goal: list[float]) -> None:
+        self._start, self._goal, self._began = self.at(), goal, monotonic()
+        far = max(abs(a - b) for a, b in zip(self._start, goal, strict=True))
+        self._lasts = far / SPEED
+
+    def halt(self) -> None:
+        self._start = self._goal = self.at()
+        self._lasts = 0.0
+
+
+class LegsOfWorld:
+    """The legs of a mock machine: extension = q - reference of the drawing."""
+
+    def __init__(self, legs: Sequence[LegMotion], reference: Sequence[float]) -> None:
+        self._legs, self._reference = legs, reference
+
+    def at(self) -> list[float]:
+        return [r + leg.position() for r, leg in zip(self._reference, self._legs, strict=True)]
+
+    def goal(self) -> list[float]:
+        return [r + leg.target for r, leg in zip(self._reference, self._legs, strict=True)]
+
+    def moving(self) -> bool:
+        return any(leg.moving for leg in self._legs)
+
+    def go(self, goal: list[float]) -> None:
+        far = max(abs(a - b) for a, b in zip(self.at(), goal, strict=True))
+        for leg, q, reference in zip(self._legs, goal, self._reference, strict=True):
+            leg.command(q - reference, max(far / MACHINE_SPEED, 0.01))
+
+    def halt(self) -> None:
+        for leg in self._legs:
+            leg.stop()
+
+
+class LineServer:
+    """The device."""
+
+    def __init__(self, axes: Axes, limits: Sequence[tuple[float, float]]) -> None:
+        self.axes = axes
         self.limits = limits
         self.on = self.silent = False
-        self.began = self.lasts = 0.0
         self.sent: list[tuple[float, ...]] = []
-        self.structure_temp_C: float | None = None
 
     async def open(self) -> None:
         self._server = await asyncio.start_server(self._serve, "127.0.0.1", 0)
@@ -34,10 +101,6 @@ class LineServer:
     async def close(self) -> None:
         self._server.close()
         await self._server.wait_closed()
-
-    def at(self) -> list[float]:
-        share = min((monotonic() - self.began) / self.lasts, 1.0) if self.lasts else 1.0
-        return [a + share * (b - a) for a, b in zip(self.start, self.goal, strict=True)]
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         with contextlib.suppress(OSError, asyncio.CancelledError):
@@ -53,13 +116,10 @@ class LineServer:
             case ["GO", *numbers]:
                 return self._go([float(number) for number in numbers])
             case ["HALT"]:
-                self.start = self.goal = self.at()
-                self.lasts = 0.0
+                self.axes.halt()
             case ["AT?"]:
-                moving = self.at() != self.goal
-                temperature = math.nan if self.structure_temp_C is None else self.structure_temp_C
-                numbers = [*self.at(), *self.goal, temperature]
-                return f"{int(self.on)} {int(moving)} " + " ".join(map(repr, numbers))
+                numbers = " ".join(map(repr, [*self.axes.at(), *self.axes.goal()]))
+                return f"{int(self.on)} {int(self.axes.moving())} {numbers}"
             case _:
                 return "NO what?"
         return "OK"
@@ -69,9 +129,7 @@ class LineServer:
             return "NO power"
         if any(not low <= q <= high for q, (low, high) in zip(goal, self.limits, strict=True)):
             return "NO limit"
-        self.start, self.goal, self.began = self.at(), goal, monotonic()
-        farthest = max(abs(a - b) for a, b in zip(self.start, goal, strict=True))
-        self.lasts = farthest / SPEED
+        self.axes.go(goal)
         self.sent.append(tuple(goal))
         return "OK"
 
@@ -79,7 +137,7 @@ class LineServer:
 class LineMotors:
     """The driver: :class:`drivers.interface.Motors`."""
 
-    can = ControllerCan(parameters=False, homes=False, channels=("structure_temp_C",))
+    can = ControllerCan(parameters=False, homes=False, channels=())
 
     def __init__(
         self, names: Sequence[str], reader: asyncio.StreamReader, writer: asyncio.StreamWriter
@@ -158,10 +216,26 @@ class LineMotors:
             await self._say("HALT")
 
     async def channels(self) -> dict[str, float]:
-        temperature = (await self._numbers())[-1]
-        return {} if math.isnan(temperature) else {"structure_temp_C": temperature}
+        return {}
 
     async def close(self) -> None:
         self._writer.close()
         with contextlib.suppress(OSError):
             await self._writer.wait_closed()
+
+
+def _address(settings: Mapping[str, Any]) -> str:
+    return f"line {settings['port']}"
+
+
+async def _open(around: Surroundings) -> LineMotors:
+    return await LineMotors.connect(around.settings["port"], [a.name for a in around.actuators])
+
+
+KIND: Kind[LineMotors] = Kind(
+    says="Motors on a line of text",
+    settings=(Setting("port", "whole", "its TCP port"),),
+    open=_open,
+    address=_address,
+    takes="actuators",
+)

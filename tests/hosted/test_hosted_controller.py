@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from line_motors import LineMotors, LineServer
+from line_motors import BareAxes, LineMotors, LineServer
 
 from app.files.machines import load_machine
 from app.hosted.controller import HostedController
 from app.hosted.means import ByMotors
+from app.hosted.parameters import ParameterSet
 from app.hosted.store import HostStore
 from calib.mechanism.solve import forward, inverse
 from drivers.contract import CONTROLLER_LAWS, ControllerBench, Law, why_not
@@ -26,7 +27,7 @@ POSE = (4.0, -7.0, 224.0, 0.03, -0.05, 0.02)
 
 @contextlib.asynccontextmanager
 async def device() -> AsyncIterator[LineServer]:
-    server = LineServer(list(MACHINE.home_q), [a.limits for a in MACHINE.actuators])
+    server = LineServer(BareAxes(MACHINE.home_q), [a.limits for a in MACHINE.actuators])
     await server.open()
     try:
         yield server
@@ -158,3 +159,118 @@ async def test_poses_are_checked_as_they_would_be_sent(tmp_path: Path) -> None:
         q = await controller.move_to_pose(POSE)
         await controller.close()
     assert q == pytest.approx(MACHINE.coordinates(sent)[:, 1], abs=1e-12)
+
+
+# what was found beside the geometry
+
+
+async def told(controller: HostedController, pose: tuple[float, ...], **channels: float):
+    controller.told(channels)
+    q = await controller.move_to_pose(pose)
+    await controller.wait_arrived(5.0)
+    return np.array(q)
+
+
+@contextlib.asynccontextmanager
+async def with_effects(
+    folder: Path, values: dict[str, float], own: dict[str, str] | None = None
+) -> AsyncIterator[HostedController]:
+    async with device() as server:
+        controller = await connect(server, folder)
+        nominal = await controller.read_parameters()
+        await controller.replace_parameters(ParameterSet({**nominal, **values}, own or {}))
+        await controller.enable()
+        yield controller
+        await controller.close()
+
+
+async def test_lost_motion_is_made_up_for_in_the_direction_of_approach(tmp_path: Path) -> None:
+    lost = {f"backlash.{limb.name}": 0.04 for limb in MACHINE.limbs}
+    low, high = (0.0, 0.0, 210.0, 0.0, 0.0, 0.0), (0.0, 0.0, 230.0, 0.0, 0.0, 0.0)
+    async with with_effects(tmp_path, lost) as controller:
+        await told(controller, low)
+        upwards = await told(controller, HOME)
+        await told(controller, high)
+        downwards = await told(controller, HOME)
+    # The drive goes half the play farther than the leg, to either side.
+    assert np.abs(upwards - downwards) == pytest.approx(0.04, abs=1e-9)
+
+
+async def test_warm_legs_are_commanded_shorter_and_nobody_telling_is_said(tmp_path: Path) -> None:
+    heard: list[str] = []
+    async with with_effects(tmp_path, {"thermal-growth.a": 1.2e-5}) as controller:
+        controller.on_alarm(lambda alarm: heard.append(alarm.what))
+        cold = await told(controller, HOME, structure_temp_C=20.0)
+        warm = await told(controller, HOME, structure_temp_C=25.0)
+        assert not heard
+        silent = await told(controller, HOME)
+        await told(controller, HOME, structure_temp_C=float("nan"))
+    length = MACHINE.nominal[MACHINE.index("leg1.L0")]
+    assert (cold - warm) == pytest.approx(1.2e-5 * 5.0 * length, rel=0.05)
+    assert silent == pytest.approx(cold, abs=1e-9)
+    assert heard == ["nobody tells structure_temp_C: thermal-growth compensated for 20"]
+
+
+OWN = """
+[effect]
+id = "door"
+says = "the cabinet's door pulls"
+expression = "k * door_open"
+unknowns = { k = "mm" }
+"""
+
+
+async def test_an_operators_formula_is_compensated_and_its_text_is_in_the_store(
+    tmp_path: Path,
+) -> None:
+    heard: list[str] = []
+    values = {f"door.{axis.name}.k": 0.02 for axis in MACHINE.axes}
+    async with with_effects(tmp_path, values, {"door": OWN}) as controller:
+        controller.on_alarm(lambda alarm: heard.append(alarm.what))
+        shut = await told(controller, HOME, door_open=0.0)
+        wide = await told(controller, HOME, door_open=1.0)
+        unknown = await told(controller, HOME)
+        await controller.store_parameters()
+    assert shut - wide == pytest.approx(0.02, abs=1e-9)
+    assert unknown == pytest.approx(shut, abs=1e-9)
+    assert heard == ["nobody tells door_open: door not compensated"]
+    async with device() as server:
+        again = await connect(server, tmp_path)
+        assert again.chosen.own == {"door": OWN}
+        assert (await again.read_parameters())["door.leg1.k"] == 0.02
+        await again.close()
+
+
+@pytest.mark.parametrize(
+    ("values", "own", "says"),
+    [
+        ({"backlash.leg1": 0.01}, {}, "lacks a value of backlash"),
+        ({"door.leg1.k": 0.01}, {}, "nor of an effect"),
+        ({"tracker-scale.k": 1e-6}, {}, "no effect of the machine"),
+        ({"door.leg1.k": 0.01}, {"door": "[effect]"}, "no unknowns are declared"),
+    ],
+)
+async def test_effects_that_mean_nothing_are_refused(
+    values: dict[str, float], own: dict[str, str], says: str, tmp_path: Path
+) -> None:
+    async with device() as server:
+        controller = await connect(server, tmp_path)
+        nominal = await controller.read_parameters()
+        with pytest.raises(Refused, match=says):
+            await controller.replace_parameters(ParameterSet({**nominal, **values}, own))
+        assert await controller.read_parameters() == nominal
+        await controller.close()
+
+
+async def test_a_stop_on_the_way_is_remembered(tmp_path: Path) -> None:
+    """After a stop the legs come from where they were stopped, not from where they were sent."""
+    lost = {f"backlash.{limb.name}": 0.04 for limb in MACHINE.limbs}
+    low, high = (0.0, 0.0, 205.0, 0.0, 0.0, 0.0), (0.0, 0.0, 235.0, 0.0, 0.0, 0.0)
+    async with with_effects(tmp_path, lost) as controller:
+        await told(controller, low)
+        upwards = await told(controller, HOME)
+        await told(controller, low)
+        await controller.move_to_pose(high)
+        await controller.stop()  # at once: still below home
+        again = await told(controller, HOME)
+    assert again == pytest.approx(upwards, abs=1e-9)

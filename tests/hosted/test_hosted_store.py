@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -21,8 +22,10 @@ def changed(by: float) -> ParameterSet:
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> HostStore:
-    return HostStore(tmp_path / "store", MACHINE)
+def store(tmp_path: Path) -> Iterator[HostStore]:
+    made = HostStore(tmp_path / "store", MACHINE)
+    yield made
+    made.close()
 
 
 def test_a_machine_that_was_never_calibrated_has_its_drawing(store: HostStore) -> None:

@@ -5,9 +5,11 @@ import asyncio
 import numpy as np
 
 from app.files.pose_table import HOME, Pose
+from app.hosted.controller import HostedController
 from app.session.events import LivePose, PoseCommanded
 from app.session.journal import NewRow
 from app.session.plan import Step
+from app.session.routines.conditions import channels
 from app.session.work import Done, Work
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import Poses
@@ -45,6 +47,8 @@ async def go(work: Work, label: str) -> None:
     memory = work.memory
     memory.standing_at, memory.settled = None, False
     pose = work.pose(label)
+    if isinstance(work.controller, HostedController):
+        work.controller.told({"delay_s": memory.delay_s, **await channels(work)})
     q = await work.controller.move_to_pose(commanded_coordinates(work.site.machine, pose))
     memory.q = q
     row = NewRow("move", work.clock.now(), label, q)

@@ -9,13 +9,13 @@ from app.session.known import compare_with_known
 from app.session.path import check_waypoints, waypoints
 from app.session.plan import Step
 from app.session.routines.beam import choose_reflector
+from app.session.routines.conditions import channels
 from app.session.routines.moving import commanded_coordinates, take_stock
 from app.session.work import Done, Work
 from drivers.errors import DeviceFault, NotReady, Refused
 
 _LOOK_S = 10.0
 """Machine seconds between two looks at the channels while warming up."""
-_CHANNELS_AGE_S = 8.0
 _PATIENCE = 30.0
 """How many times the warm-up span the machine may take to become steady."""
 
@@ -145,20 +145,6 @@ def _slope(seen: list[tuple[float, dict[str, float]]]) -> float:
     (t0, first), (t1, last) = seen[0], seen[-1]
     changes = [abs(last[k] - first[k]) for k in last if k.endswith("temp_C") and k in first]
     return max(changes, default=0.0) / max((t1 - t0) / 60.0, 1e-3)
-
-
-async def channels(work: Work) -> dict[str, float]:
-    """Everything that controller and tracker say about the state of things.
-
-    Asked anew when the last answer is older than a few machine seconds: the nests of one pose
-    share it, temperatures are slower.
-    """
-    asked, known = work.memory.channels
-    if not known or work.clock.now() - asked > _CHANNELS_AGE_S:
-        tracker_says = await work.tracker.channels()
-        known = {**tracker_says, **await work.controller.channels()}
-        work.memory.channels = (work.clock.now(), known)
-    return dict(known)
 
 
 async def rest(work: Work, step: Step) -> Done:

@@ -18,8 +18,8 @@ from app.session.routines.carrying import (
     rejected_row,
     wrong_hole,
 )
+from app.session.routines.conditions import channels
 from app.session.routines.moving import ensure_at
-from app.session.routines.preparing import channels
 from app.session.routines.reverifying import reverify
 from app.session.work import Done, Work
 from drivers.errors import NotReady
@@ -86,6 +86,7 @@ def reading_row(
     state_channels: dict[str, float],
 ) -> NewRow:
     """Everything that a reading leaves in the journal."""
+    work.memory.delay_s = max(begun - work.memory.arrived_s, 0.0)
     return NewRow(
         kind="reading",
         time_s=begun,
@@ -94,7 +95,7 @@ def reading_row(
         nest=nest,
         xyz=reading.xyz,
         covariance=reading.covariance,
-        delay_s=max(begun - work.memory.arrived_s, 0.0),
+        delay_s=work.memory.delay_s,
         channels=state_channels,
         raw={
             "temperature_C": reading.temperature_C,

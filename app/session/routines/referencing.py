@@ -9,8 +9,8 @@ from app.session.events import DriftChecked, FrameFound
 from app.session.plan import Step
 from app.session.routines.beam import measured
 from app.session.routines.carrying import ensure_smr, rejected_row
+from app.session.routines.conditions import channels
 from app.session.routines.moving import ensure_at
-from app.session.routines.preparing import channels
 from app.session.routines.reading import reading_row, reading_taken
 from app.session.work import Done, Work
 from calib.arrays import Array
