@@ -7,7 +7,7 @@ explained and all together are not, the runs are of two machines, or of one that
 import math
 from dataclasses import dataclass
 
-from scipy import stats
+from scipy import special
 
 from calib.errors import BadInput
 from calib.identify.fitting import Fit
@@ -60,7 +60,7 @@ def runs_at_odds(fitted: Fit) -> AtOdds | None:
     if dof <= 0 or shared <= 0 or fitted.chi2_per_dof < TOGETHER_WORSE * chi2 / dof:
         return None
     ratio = (fitted.chi2 - chi2) / shared / (chi2 / dof)
-    if stats.f.sf(ratio, shared, dof) > BY_CHANCE:
+    if special.fdtrc(shared, dof, ratio) > BY_CHANCE:
         return None
     total = sum(one.readings * one.rms_mm**2 for one in apart)
     return AtOdds(math.sqrt(total / readings), fitted.rms_mm)
@@ -71,8 +71,8 @@ def untrue_uncertainties(fitted: Fit) -> str:
     if not fitted.dof > 0:
         return ""
     scatter = math.sqrt(fitted.chi2_per_dof)
-    if scatter > TOO_SMALL and stats.chi2.sf(fitted.chi2, fitted.dof) < BY_CHANCE:
+    if scatter > TOO_SMALL and special.chdtrc(fitted.dof, fitted.chi2) < BY_CHANCE:
         return f"The readings scatter {scatter:.2g} times as much as sx, sy, sz say"
-    if scatter < TOO_LARGE and stats.chi2.cdf(fitted.chi2, fitted.dof) < BY_CHANCE:
+    if scatter < TOO_LARGE and special.chdtr(fitted.dof, fitted.chi2) < BY_CHANCE:
         return f"The readings scatter only {scatter:.2g} times as much as sx, sy, sz say"
     return ""

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from calib.discover.agreement import TOGETHER_WORSE, runs_at_odds, untrue_uncertainties
 from calib.discover.diagnosis import RunDiagnosis
@@ -106,7 +106,7 @@ def _significant(estimates: Sequence[Estimate], acting: Sequence[str] = ()) -> l
     Several linear unknowns of a kind share 5 %; nonlinear ones are always listed.
     """
     linear = linear_among(estimate.unknown for estimate in estimates)
-    limit = float(stats.norm.isf(0.025 / max(1, int(linear.sum()))))
+    limit = -float(special.ndtri(0.025 / max(1, int(linear.sum()))))
     clear = np.array([abs(one.value) > limit * one.sigma for one in estimates])
     if linear.sum() == 1 or not np.any(clear & linear):
         chosen = np.array([estimate.name in acting for estimate in estimates])

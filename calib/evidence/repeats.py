@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from calib.arrays import Array
 
@@ -61,6 +61,6 @@ def pure_error(residual: Array, states: Sequence[object], dof: float) -> PureErr
     return PureError(
         dof=freedom,
         variance=squares / freedom,
-        p_value=float(stats.chi2.sf(squares, freedom)),
+        p_value=float(special.chdtrc(freedom, squares)),
         excess=min(beyond / misfit, 1.0) if misfit > 0.0 else 0.0,
     )

@@ -10,7 +10,7 @@ every reading, does not make bad readings of good ones.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from calib.arrays import Array, BoolArray
 from calib.runs.stack import Rows
@@ -107,7 +107,7 @@ def _worst(
     worst = int(np.argmax(drop))
     others = max((total - drop[worst]) / max(dof - 3.0, 1.0), 1.0)
     ratio = drop[worst] / 3.0 / others
-    chance = count * float(stats.f.sf(ratio, 3, max(dof - 3.0, 1.0)))
+    chance = count * float(special.fdtrc(3, max(dof - 3.0, 1.0), ratio))
     if chance > FALSE_ALARM:
         return None, step
     return worst, step - spread[:, :, worst] @ freed[worst]
