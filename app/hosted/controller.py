@@ -102,6 +102,10 @@ class HostedController:
         """Read a snapshot, in the actuators of the machine."""
         return await self._means.state()
 
+    async def frame(self) -> dict[str, str]:
+        """What the poses of a closed controller refer to, in its own words; empty for motors."""
+        return await self._means.frame()
+
     async def enable(self) -> None:
         """Bring all drives to operation enabled."""
         await self._means.device.enable()

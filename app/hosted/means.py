@@ -37,6 +37,9 @@ class Means(Protocol):
     async def home(self, actuator: str) -> None:
         """Find the reference of an actuator of the machine."""
 
+    async def frame(self) -> dict[str, str]:
+        """What poses refer to, in the device's own words."""
+
 
 class ByMotors:
     """Drives that take actuator values: q goes as it is."""
@@ -58,6 +61,10 @@ class ByMotors:
     async def home(self, actuator: str) -> None:
         """Run one drive's homing."""
         await self.device.home(actuator)
+
+    async def frame(self) -> dict[str, str]:
+        """Nothing: it knows no poses."""
+        return {}
 
 
 class ByPoses:
@@ -118,6 +125,10 @@ class ByPoses:
         for axis in (await self.device.state()).actuators:
             if not axis.homed:
                 await self.device.home(axis.name)
+
+    async def frame(self) -> dict[str, str]:
+        """Pivot, coordinate system and rotation order, as it says them."""
+        return await self.device.frame()
 
     def _coordinates(self, pose: tuple[float, ...]) -> tuple[float, ...]:
         """Actuator coordinates (n,) of the drawn machine at a pose; nan where it does not close."""

@@ -41,8 +41,9 @@ CREATE TABLE IF NOT EXISTS notes (
     kind TEXT NOT NULL, text TEXT NOT NULL);
 """
 
-PARAMETERS, SMRS = "controller_parameters", "smrs"
-"""Facts about a session: what the controller held at connect, nest of each SMR by its number."""
+PARAMETERS, SMRS, FRAME = "controller_parameters", "smrs", "controller_frame"
+"""Facts about a session: what the controller held at connect, nest of each SMR by its number, what
+the poses of a closed controller refer to."""
 PENDING = ("planned", "started", "failed")
 _GOOD_READING = "kind = 'reading' AND status = 'good'"
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.errors import BadInput
-from calib.toml_table import TomlTable
+from calib.toml_table import Asked, TomlTable
 
 FORMAT = "pkm-run/1"
 GRAVITY = (0.0, 0.0, -9.80665)
@@ -40,6 +40,8 @@ class Header:
     controller_parameters: Mapping[str, float] = field(default_factory=dict)
     compensation: Mapping[str, float] = field(default_factory=dict)
     """What the controller compensated meanwhile, by its own names; missing is zero."""
+    controller_frame: Mapping[str, str] = field(default_factory=dict)
+    """What the poses of a closed controller referred to, in its own words: pivot, system, order."""
     load: Load | None = None
 
 
@@ -99,8 +101,14 @@ def header_of(top: TomlTable, parameters: Collection[str] | None = None) -> Head
         base_nests={name: np.array(base.numbers(name, 3, unit="mm")) for name in base},
         controller_parameters=_controller_parameters(controller, parameters),
         compensation=controller.numbers_by_name("compensation"),
+        controller_frame=_texts(controller.named("frame", required=False)),
         load=load_of(top.table("load", required=False)) if top.has("load") else None,
     )
+
+
+def _texts(table: TomlTable) -> dict[str, str]:
+    table.note("", Asked("text", "", False, None))
+    return {name: table.text(name) for name in table}
 
 
 def _tracker(top: TomlTable) -> dict[str, Any]:

@@ -60,7 +60,11 @@ def format_header(header: Header) -> str:
         "platform": {name: p.tolist() for name, p in header.platform_nests.items()},
         "base": {name: p.tolist() for name, p in header.base_nests.items()},
     }
-    held = {"parameters": header.controller_parameters, "compensation": header.compensation}
+    held: dict[str, Mapping[str, Any]] = {
+        "parameters": header.controller_parameters,
+        "compensation": header.compensation,
+        "frame": header.controller_frame,
+    }
     if any(held.values()):
         table["controller"] = {name: dict(values) for name, values in held.items() if values}
     if header.load is not None:

@@ -1,11 +1,15 @@
 """The host store: sets survive whatever happens, or are refused with the way back."""
 
 import json
+import os
+import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app.errors import GateRefused
@@ -103,6 +107,29 @@ def test_a_second_process_is_refused_and_told_who_owns_it(store: HostStore) -> N
     again = HostStore(store.folder, MACHINE)
     again.open()
     again.close()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the system cannot fork")
+def test_a_process_killed_while_it_stores_leaves_the_old_set_or_the_new_one(
+    store: HostStore,
+) -> None:
+    generator = np.random.default_rng(8)
+    seen = set()
+    for _ in range(12):
+        child = os.fork()
+        if child == 0:  # stores until it is killed: value n in set n
+            mine = HostStore(store.folder, MACHINE)
+            mine.open()
+            while True:
+                mine.save(changed(float(len(mine.numbers()) + 1)))
+        time.sleep(float(generator.uniform(0.002, 0.05)))
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        number, held = store.load()
+        assert held == (changed(float(number)) if number else ParameterSet.nominal(MACHINE))
+        seen.add(number)
+    store.open()  # no lock outlives its process
+    assert len(seen) > 1
 
 
 def test_two_stores_of_one_folder_exclude_each_other(store: HostStore) -> None:

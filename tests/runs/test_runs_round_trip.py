@@ -42,6 +42,7 @@ def headers(draw):
         base_nests={name: draw(vectors()) for name in names[cut:]},
         controller_parameters=draw(values),
         compensation=draw(values),
+        controller_frame=draw(st.dictionaries(NAME.filter(bool), NAME, max_size=2)),
         load=draw(st.none() | load),
     )
 
