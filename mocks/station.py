@@ -33,6 +33,7 @@ from mocks.control import ControlServer, Hands
 from mocks.gcs.server import GcsStation
 from mocks.hidden.table import Hidden
 from mocks.physics.bodies import BODIES
+from mocks.physics.hexapod import HOME_Z
 from mocks.physics.truth import draw_parameters, machine_file, read_parameters
 from mocks.tracker.instrument import SERIAL
 from mocks.tracker.lines import LineServer
@@ -42,6 +43,11 @@ from mocks.world import World, WorldPlan
 CONTROLLER_NODE = 10
 ON_GCS = ("tripod",)
 """Machines whose controller speaks GCS; the others are on CANopen."""
+POSE_SITE = {
+    "rotation": "Rx Ry Rz", "angle_unit": "deg", "system": "ZERO",
+    "origin": [0.0, 0.0, HOME_Z], "pivot": [0.0, 0.0, 0.0],
+}  # fmt: skip
+"""How a closed hexapod's poses are to be read."""
 LINES_SIGMA_MM = 0.006
 FRAME_ERROR_MM, FRAME_ERROR_RAD = 3.0, 0.003
 
@@ -57,14 +63,16 @@ class MockStation:
         ports: tuple[int, int, int] = (0, 0, 0),
         serial: int | None = None,
         lines: bool = False,
+        pose: bool = False,
     ) -> None:
         self.world = world
         self.clock = clock
+        self.pose = pose
         self.serial = serial if serial is not None else _serial(nvm)
         host = "127.0.0.1"
         self.controller: CanopenStation | GcsStation = (
-            GcsStation(world, nvm, host, ports[0], True, self.serial)
-            if world.machine.name in ON_GCS
+            GcsStation(world, nvm, host, ports[0], True, self.serial, pose)
+            if pose or world.machine.name in ON_GCS
             else CanopenStation(world, nvm, host, ports[0], self.serial)
         )
         self.tracker = TrackerServer(world, clock, host, ports[1])
@@ -114,7 +122,10 @@ class MockStation:
 
     def _controller_site(self) -> dict[str, Any]:
         if isinstance(self.controller, GcsStation):
-            return {"kind": "gcs", "port": self.controller.pty_path or self.channel}
+            port = self.controller.pty_path or self.channel
+            return {"kind": "pose", "port": port, **POSE_SITE} if self.pose else {
+                "kind": "gcs", "port": port,
+            }  # fmt: skip
         return {
             "kind": "canopen", "interface": "slcan", "channel": self.channel,
             "node": CONTROLLER_NODE,
@@ -199,6 +210,10 @@ def parser() -> argparse.ArgumentParser:
         "--lines", action="store_true",
         help="the tracker only sends x y z lines (the driver of examples/line_tracker)",
     )  # fmt: skip
+    parser.add_argument(
+        "--pose", action="store_true",
+        help="hexapod: a closed controller that takes poses over GCS and shows no parameters",
+    )  # fmt: skip
     parser.add_argument("--payload", type=float, default=0.0, help="kg")
     for name in ("controller", "tracker", "control"):
         parser.add_argument(f"--{name}-port", type=int, default=0)
@@ -228,7 +243,11 @@ def build(options: argparse.Namespace) -> MockStation:
     world = World(clock, plan)
     world.payload_kg = options.payload
     ports = (options.controller_port, options.tracker_port, options.control_port)
-    return MockStation(world, clock, options.nvm, ports, options.serial, options.lines)
+    if options.pose and options.machine != "hexapod":
+        raise ValueError(f"there is no closed controller (--pose) of the {options.machine}")
+    return MockStation(
+        world, clock, options.nvm, ports, options.serial, options.lines, options.pose
+    )
 
 
 async def run(options: argparse.Namespace) -> None:

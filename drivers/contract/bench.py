@@ -1,15 +1,17 @@
 """What a driver is tested on: a device that stands ready, and what can be done to it."""
 
 import asyncio
+import math
 from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from drivers.errors import DeviceError
-from drivers.interface import MotionController, Tracker
+from drivers.interface import MotionController, PoseMover, Tracker
 from drivers.kind import ActuatorFacts
 
-DeviceT = TypeVar("DeviceT", MotionController, Tracker)
+POSE_AXES = (("x", "mm"), ("y", "mm"), ("z", "mm"), ("rx", "rad"), ("ry", "rad"), ("rz", "rad"))
+"""Axes of a controller that takes poses, as its state names them."""
 Act = Callable[[], Awaitable[None]]
 Point = tuple[float, float, float]
 
@@ -70,8 +72,68 @@ class ControllerBench:
     silence: Act | None = None
     settle_s: float = 1.0
 
+    @property
+    def axes(self) -> tuple[tuple[str, str], ...]:
+        """Names and units of its actuators."""
+        return tuple((actuator.name, actuator.unit) for actuator in self.actuators)
 
-BenchT = TypeVar("BenchT", TrackerBench, ControllerBench)
+    async def connect(self) -> MotionController:
+        """A new driver."""
+        return await self.open()
+
+    async def start(self, device: MotionController, which: int) -> None:
+        """Start moving to one of the two poses."""
+        await device.move_to_pose(self.poses[which])
+
+    async def start_out_of_reach(self, device: MotionController) -> None:
+        """Ask for the pose that it must refuse."""
+        await device.move_to_pose(self.unreachable)
+
+    async def start_nan(self, device: MotionController) -> None:
+        """Ask for what is no pose."""
+        await device.move_to_pose((math.nan, *self.poses[0][1:]))
+
+
+@dataclass(frozen=True)
+class PoseBench:
+    """A controller that takes poses, whose machine may move.
+
+    Attributes
+    ----------
+    open, longest_s, poses, unreachable, silence, settle_s
+        As of :class:`ControllerBench`; poses as :class:`~drivers.interface.PoseMover` takes them.
+    """
+
+    open: Callable[[], Awaitable[PoseMover]]
+    longest_s: float
+    poses: tuple[tuple[float, ...], tuple[float, ...]]
+    unreachable: tuple[float, ...]
+    silence: Act | None = None
+    settle_s: float = 1.0
+
+    @property
+    def axes(self) -> tuple[tuple[str, str], ...]:
+        """Names and units of its axes."""
+        return POSE_AXES
+
+    async def connect(self) -> PoseMover:
+        """A new driver."""
+        return await self.open()
+
+    async def start(self, device: PoseMover, which: int) -> None:
+        """Start moving to one of the two poses."""
+        await device.move_pose(self.poses[which])
+
+    async def start_out_of_reach(self, device: PoseMover) -> None:
+        """Ask for the pose that it must refuse."""
+        await device.move_pose(self.unreachable)
+
+    async def start_nan(self, device: PoseMover) -> None:
+        """Ask for what is no pose."""
+        await device.move_pose((math.nan, *self.poses[0][1:]))
+
+
+BenchT = TypeVar("BenchT", TrackerBench, ControllerBench, PoseBench)
 
 
 @dataclass(frozen=True)

@@ -3,16 +3,22 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from drivers.gcs.conventions import Convention
+
 # Bits of status register 1.
 ERROR, SERVO, MOVING, REFERENCING, ON_TARGET = 1 << 8, 1 << 12, 1 << 13, 1 << 14, 1 << 15
 
 
 @dataclass(frozen=True)
 class Axes:
-    """Actuator name -> axis of the controller, and the axes of the platform's position."""
+    """Actuator name -> axis of the controller, and the axes of the platform's pose.
+
+    ``turns``: how angles are written, where the pose axes are six; else they are its position.
+    """
 
     actuators: Mapping[str, str]
     pose: Sequence[str]
+    turns: Convention | None = None
 
     @property
     def driven(self) -> list[str]:

@@ -11,6 +11,12 @@ from drivers.interface import Identity
 
 def recognise(line: Line, serial: str | None, groups: frozenset[str]) -> tuple[Identity, Layout]:
     """Return who answers and what it holds; raises ConnectFailed, Refused, ProtocolError."""
+    identity = greet(line, serial, "gcs-controller")
+    return identity, read_layout(line.query("HPA?"), line.device, groups)
+
+
+def greet(line: Line, serial: str | None, kind: str) -> Identity:
+    """Return who answers; raises ConnectFailed, and Refused for another serial number."""
     try:
         line.synchronise()
     except Silence as error:
@@ -22,14 +28,14 @@ def recognise(line: Line, serial: str | None, groups: frozenset[str]) -> tuple[I
     vendor, product, number, firmware = (
         field.strip() for field in line.identity.split(",", maxsplit=3)
     )
-    identity = Identity("gcs-controller", vendor, product, number, firmware)
+    identity = Identity(kind, vendor, product, number, firmware)
     if serial is not None and number != serial:
         raise Refused(
             f"has serial number {number}, expected {serial}",
             device=line.device,
             remedy="Connect the right machine, or correct the site file.",
         )
-    return identity, read_layout(line.query("HPA?"), line.device, groups)
+    return identity
 
 
 def check_limits(line: Line, limits: Mapping[str, tuple[float, float]]) -> None:

@@ -2,11 +2,12 @@
 
 from drivers.errors import DeviceError, DeviceFault, DriveFault, Refused
 
+UNKNOWN_COMMAND = 2
 NOT_ENABLED, STOPPED, UNKNOWN_PARAMETER, MOTION_ERROR = 5, 10, 54, 1024
 
 WORDS = {
     1: ("syntax error", "Check that this controller speaks GCS 2.0."),
-    2: ("unknown command", "Check that this is the controller of the site file."),
+    UNKNOWN_COMMAND: ("unknown command", "Check that this is the controller of the site file."),
     NOT_ENABLED: (
         "an axis is not enabled or does not know its reference",
         "Enable the machine; home the actuators that lost their reference.",
@@ -32,10 +33,17 @@ WORDS = {
     56: ("wrong password", "Check the passwords in the site file."),
     60: ("the parameter is protected", "Check the command level's password in the site file."),
     64: ("the parameter is read only", ""),
+    63: ("it is still starting up", "Wait until it is ready, then try again."),
     93: ("not allowed while an axis moves", "Stop the machine first."),
     95: ("not allowed while servos are on", "Disable motion first, then try again."),
     305: ("its memory cannot be written", "The old values are still stored."),
     333: ("hardware error", "Restore the snapshot, switch the controller off and on, try again."),
+    530: ("there is no coordinate system of that name", "Check system in the site file."),
+    536: ("not allowed while the hexapod moves", "Stop the machine first."),
+    544: (
+        "this coordinate system has its own centre of rotation: a pivot cannot be set",
+        "Define the pivot with the coordinate system, or use another one.",
+    ),
     MOTION_ERROR: (
         "a servo switched itself off",
         "Remove the cause, clear the faults and enable the machine again.",

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from drivers.errors import Refused
+from drivers.gcs.conventions import ORDERS, ROTATION, Convention
 from drivers.interface import MotionController
 from drivers.kind import Kind, Setting, Surroundings
 
@@ -13,10 +15,11 @@ async def _open(around: Surroundings) -> MotionController:
 
     settings = around.settings
     names = [actuator.name for actuator in around.actuators]
+    actuators = dict(zip(names, settings["axes"], strict=True))
     return await GcsController.connect(
         settings["port"],
         settings["baudrate"],
-        axes=Axes(dict(zip(names, settings["axes"], strict=True)), settings["pose_axes"]),
+        axes=Axes(actuators, settings["pose_axes"], _convention(settings)),
         serial=around.serial or None,
         limits={actuator.name: actuator.limits for actuator in around.actuators},
         level=f"CCL 1 {settings['level_password']}",
@@ -24,6 +27,29 @@ async def _open(around: Surroundings) -> MotionController:
         silence_s=settings["silence_s"],
         parameters=around.parameters,
     )
+
+
+def _convention(settings: Mapping[str, Any]) -> Convention | None:
+    """How angles are written; None where the platform does not turn.
+
+    Raises Refused where that is not stated: a controller that counts in degrees would make 0.1 deg
+    of 0.1 rad, and say nothing.
+    """
+    count = len(settings["pose_axes"])
+    if count == 3:
+        return None
+    if count != 6:
+        raise Refused(
+            f"pose_axes names {count} axes; a platform has 3, or 6 where it turns",
+            remedy="Correct pose_axes under [controller] of the site file",
+        )
+    missing = [name for name in ("angle_unit", "rotation") if not settings[name]]
+    if missing:
+        raise Refused(
+            f"pose_axes names angles, and {' and '.join(missing)} is not stated",
+            remedy="Write angle_unit and rotation under [controller] of the site file",
+        )
+    return Convention(settings["rotation"], settings["angle_unit"] == "deg")
 
 
 def _address(settings: Mapping[str, Any]) -> str:
@@ -40,6 +66,11 @@ KIND: Kind[MotionController] = Kind(
             count="actuators",
         ),
         Setting("pose_axes", "words", "and the coordinates of the platform", ["X", "Y", "Z"]),
+        Setting(
+            "angle_unit", "text", "where pose_axes names angles too: their unit", "",
+            choices=("deg", "rad"),
+        ),
+        Setting("rotation", "text", f"then also the {ROTATION}", "", choices=ORDERS),
         Setting("level_password", "text", "of its command level 1", "advanced"),
         Setting("store_password", "text", "of storing parameters", "100"),
         Setting(

@@ -21,7 +21,8 @@ ENCODING = "cp1252"
 ANSWER_S = 1.0
 READ_S, WRITE_S = 0.02, 0.5
 LONGEST_ANSWER = 1 << 16
-STOP, MOTION = b"\x18", b"\x05"
+STOP, MOTION, READY = b"\x18", b"\x05", b"\x07"
+IS_READY, IS_BUSY = "\xb1", "\xb0"
 # What ends a line that was cut off while it was written, without completing it to a command.
 SPOIL = "?\n"
 REMEDY = "Check cable, address and baud rate, then connect again."
@@ -87,9 +88,20 @@ class Line:
         """
         return self._twice(lambda: self._query(text, timeout), timeout)
 
+    def bare(self, text: str, timeout: float = ANSWER_S) -> str:
+        """Send a query whose answer is a bare number, as that of ``ERR?``; raises as above.
+
+        What ends the exchange is the identity: before it come two answers, or a refusal alone.
+        """
+        return self._twice(lambda: self._bare(text, timeout), timeout)
+
     def moving(self) -> bool:
         """Whether any axis moves (#5); raises as :meth:`query`."""
         return self._twice(self._moving, ANSWER_S)
+
+    def ready(self) -> bool:
+        """Whether it takes commands (#7), not busy with a reference move; raises as above."""
+        return self._twice(self._ready, ANSWER_S)
 
     def _twice(self, ask: Callable[[], T], timeout: float) -> T:
         try:
@@ -112,6 +124,19 @@ class Line:
         self._in_step = True
         return answer
 
+    def _bare(self, text: str, timeout: float) -> str:
+        self._begin(timeout)
+        self._write(f"{text}\nERR?\n*IDN?\n")
+        answers = []
+        while (answer := self._answer(timeout)) != [self.identity]:
+            answers.append(" ".join(answer))
+        if not 1 <= len(answers) <= 2 or not re.fullmatch(r"-?\d+", answers[-1]):
+            raise self._nonsense(" ".join(answers))
+        self._in_step = True
+        if len(answers) == 1:
+            raise refusal(int(answers[0]), text.split(maxsplit=1)[0], self.device)
+        return answers[0]
+
     def _moving(self) -> bool:
         self._begin(ANSWER_S)
         self._write(MOTION.decode(ENCODING))
@@ -122,6 +147,15 @@ class Line:
             raise self._nonsense(answer[0]) from error
         self._in_step = True
         return mask != 0
+
+    def _ready(self) -> bool:
+        self._begin(ANSWER_S)
+        self._write(READY.decode(ENCODING))
+        answer = self._answer(ANSWER_S)[0]
+        if answer not in (IS_READY, IS_BUSY):
+            raise self._nonsense(answer)
+        self._in_step = True
+        return answer == IS_READY
 
     def stop(self) -> None:
         """Send #24, past everything that waits; from any thread. Raises LinkLost, Silence."""

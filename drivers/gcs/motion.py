@@ -36,8 +36,11 @@ class Motion:
         self._stopped = stops != self._link.line.stops
 
     async def to_position(self, pose: tuple[float, ...]) -> None:
-        """Start towards a position of the platform; raises Refused."""
+        """Start towards a pose of the platform; raises Refused."""
         count = len(self._axes.pose)
+        if self._axes.turns is not None:
+            self.check_numbers(pose, count, "pose")
+            pose = self._axes.turns.written(pose)
         position, turn = pose[:count], pose[count:]
         self.check_numbers(position, count, "pose")
         if any(abs(angle) > LEVEL_RAD for angle in turn):

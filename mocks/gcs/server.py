@@ -9,8 +9,10 @@ from pathlib import Path
 from mocks.canopen.ports import Machine
 from mocks.gcs.commands import CommandSet
 from mocks.gcs.controller import Controller
+from mocks.gcs.hexapod_commands import HexapodCommands
+from mocks.gcs.hexapod_controller import HexapodController
 from mocks.gcs.pseudo_terminal import PseudoTerminal
-from mocks.gcs.wire import Wire
+from mocks.gcs.wire import Commands, Electronics, Wire
 from mocks.physics.truth import machine_file, nominal_parameters
 
 TICK_S, LOOK_S = 0.005, 0.1
@@ -32,6 +34,9 @@ class GcsStation:
         Whether there is a serial line as well; ignored on Windows.
     serial : int
         Serial number, third field of ``*IDN?``.
+    pose : bool
+        Whether it is a closed hexapod, which takes poses and keeps nothing, instead of the tripod
+        with its parameters.
     """
 
     def __init__(
@@ -42,11 +47,18 @@ class GcsStation:
         port: int = 0,
         pty: bool = True,
         serial: int = 1001,
+        pose: bool = False,
     ) -> None:
         self._faults = world.faults
-        nominal = nominal_parameters(machine_file("tripod"))
-        self.controller = Controller(world, nominal, nvm_path, serial)
-        self._commands = CommandSet(self.controller)
+        self.controller: Electronics
+        self._commands: Commands
+        nominal = nominal_parameters(machine_file("hexapod" if pose else "tripod"))
+        if pose:
+            self.controller = hexapod = HexapodController(world, nominal, serial)
+            self._commands = HexapodCommands(hexapod)
+        else:
+            self.controller = tripod = Controller(world, nominal, nvm_path, serial)
+            self._commands = CommandSet(tripod)
         self._lock = threading.Lock()
         self._over = threading.Event()
         self._threads: list[threading.Thread] = []

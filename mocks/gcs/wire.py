@@ -1,12 +1,41 @@
 """The byte stream of one client: lines, and the commands of one byte that may come in between."""
 
-from mocks.gcs.commands import CommandSet
-from mocks.gcs.controller import Controller
+from typing import Protocol
 
 MOTION, READY, STOP = 0x05, 0x07, 0x18
 IS_READY, IS_BUSY = b"\xb1\n", b"\xb0\n"
 LONGEST_LINE = 4096
 ENCODING = "cp1252"
+
+
+class Electronics(Protocol):
+    """What the bytes act on: a controller of the tripod, or of a closed hexapod."""
+
+    @property
+    def busy(self) -> bool:
+        """Whether it is not ready for commands."""
+
+    def motion_mask(self) -> int:
+        """Bit n of the axes in the order of ``SAI?``: axis n moves."""
+
+    def stop(self) -> None:
+        """Stop everything."""
+
+    def heard(self) -> None:
+        """Something came from the PC."""
+
+    def tick(self) -> None:
+        """What happens by itself."""
+
+    def power_on(self) -> None:
+        """Come up anew."""
+
+
+class Commands(Protocol):
+    """What carries out lines."""
+
+    def obey(self, line: str) -> str:
+        """Carry out one line; returns the answer, "" if there is none."""
 
 
 class Wire:
@@ -16,7 +45,7 @@ class Wire:
     a line feed.
     """
 
-    def __init__(self, controller: Controller, commands: CommandSet) -> None:
+    def __init__(self, controller: Electronics, commands: Commands) -> None:
         self._controller = controller
         self._commands = commands
         self._line = bytearray()

@@ -8,12 +8,13 @@ import numpy as np
 
 from app.files.machines import load_machine
 from drivers.canopen import CanopenController
-from drivers.contract import ControllerBench, TrackerBench
+from drivers.contract import ControllerBench, PoseBench, TrackerBench
 from drivers.emscon import EmsconTracker
 from drivers.emscon.settings import EmsconSettings
 from drivers.gcs import GcsController
-from drivers.interface import MotionController, Tracker
-from drivers.kind import ActuatorFacts
+from drivers.gcs.pose_kind import KIND as POSE
+from drivers.interface import MotionController, PoseMover, Tracker
+from drivers.kind import ActuatorFacts, Surroundings
 from mocks.canopen.server import CanopenStation
 from mocks.clock import ScaledClock
 from mocks.gcs.server import GcsStation
@@ -91,7 +92,37 @@ async def controller_bench(machine: str, folder: Path) -> AsyncIterator[Controll
         station.stop()
 
 
+@contextlib.asynccontextmanager
+async def pose_bench() -> AsyncIterator[PoseBench]:
+    clock = ScaledClock(SCALE)
+    world = World(clock, WorldPlan(seed=4))
+    station = GcsStation(world, pose=True)
+
+    async def connect() -> PoseMover:
+        host, port = station.address
+        stated = {"port": f"socket://{host}:{port}", "rotation": "Rx Ry Rz"}
+        stated["origin"] = (0.0, 0.0, 220.0)
+        settings = {one.name: stated.get(one.name, one.default) for one in POSE.settings}
+        return await POSE.open(Surroundings(settings, "", "hexapod", (), {}, SCALE))
+
+    async def silence() -> None:
+        world.faults.inject("controller-silent")
+
+    station.start()
+    try:
+        yield PoseBench(
+            open=connect,
+            longest_s=LONGEST_S,
+            poses=((0.0, 0.0, 220.0, 0.0, 0.0, 0.0), (3.0, -8.0, 206.0, 0.1, -0.08, 0.15)),
+            unreachable=(0.0, 0.0, 5000.0, 0.0, 0.0, 0.0),
+            silence=silence,
+        )
+    finally:
+        station.stop()
+
+
 TRACKERS: dict[str, Callable[..., contextlib.AbstractAsyncContextManager[TrackerBench]]] = {
     "emscon": emscon_bench,
 }
 CONTROLLERS = {"canopen": "hexapod", "gcs": "tripod"}
+POSE_MOVERS = {"pose": pose_bench}
