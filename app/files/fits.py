@@ -15,7 +15,9 @@ import numpy as np
 
 from app.files.text import read_text
 from calib.arrays import Array
+from calib.command.region import Region
 from calib.errors import BadInput
+from calib.runs.header import Load, load_of
 from calib.toml_table import TomlTable
 from calib.unknown import Estimate, Unknown
 
@@ -43,6 +45,14 @@ class SavedFit:
     """What the controller compensated while the runs were taken; None if the file is silent."""
     own: Mapping[str, str] = field(default_factory=dict)
     """Texts of the operator's own effects by their id: with them the file is complete."""
+    machine_file: str = ""
+    """A lab's own machine file, from the folder of this one; empty for a shipped machine."""
+    controller: Mapping[str, float] = field(default_factory=dict)
+    """The controller's own parameters in the last run; nominal where they are missing."""
+    load: Load | None = None
+    """What the machine carried in the last run."""
+    region: Region | None = None
+    """Where it was measured; None if the file is silent."""
 
     def covariance_of(self, names: list[str]) -> Array:
         """Covariance of some parameters, in that order."""
@@ -86,7 +96,37 @@ def fit_of(top: TomlTable, source: str) -> SavedFit:
         correlated=top.has("correlations"),
         compensation=top.numbers_by_name("compensation") if top.has("compensation") else None,
         own={name: own.text(name) for name in own},
+        machine_file=top.text("machine_file", ""),
+        controller=top.numbers_by_name("controller"),
+        load=load_of(top.table("load", required=False)) if top.has("load") else None,
+        region=_region(top.table("measured")) if top.has("measured") else None,
     )
+
+
+def _region(table: TomlTable) -> Region:
+    """Ranges in which the machine was measured."""
+
+    def ranges(key: str) -> dict[str, tuple[float, float]]:
+        named = table.named(key, required=False)
+        found = {}
+        for name in named:
+            low, high = named.numbers(name, 2)
+            if low > high:
+                raise named.wrong(f"{name} ends below its start", name, remedy="Fit again")
+            found[name] = (low, high)
+        return found
+
+    return Region(table.whole("poses", 0), ranges("task"), ranges("actuators"), ranges("channels"))
+
+
+def region_table(region: Region) -> dict[str, Any]:
+    """The same to be written."""
+    return {
+        "poses": region.poses,
+        "task": {name: list(ends) for name, ends in region.task.items()},
+        "actuators": {name: list(ends) for name, ends in region.actuators.items()},
+        "channels": {name: list(ends) for name, ends in region.channels.items()},
+    }
 
 
 def _json(text: str, source: str) -> dict[str, Any]:

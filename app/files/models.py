@@ -4,19 +4,23 @@ What one session found is what ``fit``, ``apply`` and the next run begin with. A
 never written to.
 """
 
+import os
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
-from app.files.fits import MODEL_FORMAT, read_fit
+from app.files.fits import MODEL_FORMAT, read_fit, region_table
+from app.files.machines import shipped_machines
 from app.files.text import read_text
+from calib.command import Region
 from calib.effects import Effect, effect_named, is_shipped
 from calib.errors import BadInput
 from calib.formulas.effect_file import effect_from_text
 from calib.formulas.formula_effect import OperatorEffect
 from calib.identify import Fit, fit_report
 from calib.mechanism.description import Machine
+from calib.runs.header import Load
 from calib.toml_place import line_of
 
 
@@ -45,9 +49,11 @@ def write_model(path: Path, fit: Fit) -> None:
     report = fit_report(fit)
     sigma = fit.sigmas
     correlation = fit.covariance / (sigma[:, None] * sigma)
+    last = fit.model.rows.runs[-1].header
     table: dict[str, Any] = {
         "format": MODEL_FORMAT,
         "machine": fit.model.machine.name,
+        "machine_file": _machine_file(fit.model.machine, path),
         "runs": [run.source for run in fit.model.rows.runs],
         "effects": report["effects"],
         "compensation": compensation_of(fit),
@@ -66,12 +72,36 @@ def write_model(path: Path, fit: Fit) -> None:
             for entry in report["parameters"]
         ],
         "masked": report["bad_readings"],
+        "controller": dict(last.controller_parameters),
+        **({} if last.load is None else {"load": _load_table(last.load)}),
+        "measured": region_table(Region.of_fit(fit)),
         "correlations": {
             name: [round(float(value), 6) for value in row[: index + 1]]
             for index, (name, row) in enumerate(zip(fit.model.names, correlation, strict=True))
         },
     }
     path.write_text(tomli_w.dumps(table), encoding="utf-8")
+
+
+def _machine_file(machine: Machine, model: Path) -> str:
+    """Where a lab's own machine file is, from the folder of the model file; empty if shipped."""
+    source = Path(machine.source)
+    shipped = machine.name in shipped_machines() and machine.source == f"{machine.name}.toml"
+    if shipped or not source.is_file():
+        return ""
+    try:
+        return Path(os.path.relpath(source, model.parent)).as_posix()
+    except ValueError:  # on another drive of Windows
+        return str(source.resolve())
+
+
+def _load_table(load: Load) -> dict[str, Any]:
+    return {
+        "gravity": [float(v) for v in load.gravity],
+        "platform_mass_kg": float(load.platform_mass_kg),
+        "platform_com": [float(v) for v in load.platform_com],
+        "payload_com": [float(v) for v in load.payload_com],
+    }
 
 
 def read_own_effect(path: Path) -> OperatorEffect:

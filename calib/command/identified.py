@@ -20,12 +20,13 @@ from calib.unknown import linear_among
 class Found:
     """A machine effect with what was found for its unknowns.
 
-    ``values`` (U,), ``linear`` (U,) which of them move the machine linearly, ``rest`` (U,) the
-    values at which the effect adds nothing to its closure, ``needs`` the channels without which
-    it has no value.
+    ``names`` and ``values`` (U,) of its unknowns, ``linear`` (U,) which of them move the machine
+    linearly, ``rest`` (U,) the values at which the effect adds nothing to its closure, ``needs``
+    the channels without which it has no value.
     """
 
     effect: Effect
+    names: tuple[str, ...]
     values: Array
     linear: BoolArray
     rest: Array
@@ -143,6 +144,7 @@ def _found(
     needs = dict.fromkeys(c for c in (*effect.channels, *effect.depends) if c not in STATES)
     return Found(
         effect=effect,
+        names=tuple(unknowns[k].name for k in kept),
         values=np.array([values[unknowns[k].name] for k in kept], dtype=np.float64),
         linear=linear_among(unknowns)[kept],
         rest=rest[kept],

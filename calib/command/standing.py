@@ -41,21 +41,26 @@ class Standpoint:
         As commanded, mm or rad.
     unrest : (N,)
         How much the effects changed in the last pass, as a part of the machine's size.
-    twists : (n, 6, N)
-        Derivative of the platform's twist by each extension, base axes.
+    situation : Situation
+        What the effects were asked at.
     """
 
     poses: Poses
     closed: Configuration
     extension: Array
     unrest: Array
-    twists: Array
+    situation: Situation
     _done: "_Changes"
 
     @property
     def agreed(self) -> BoolArray:
         """Whether the machine closes, and its effects agree with where it stands, (N,)."""
         return self.closed.converged & (self.unrest <= AGREED)
+
+    @property
+    def twists(self) -> Array:
+        """Derivative (n, 6, N) of the platform's twist by each extension, base axes."""
+        return self.situation.actuator_twists
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +182,7 @@ def one_pass(
         product(exponential(done.twist[3:]), closed.poses.rotation),
     )
     unrest = _unrest(identified, done, None if near is None else near._done)
-    return Standpoint(poses, closed, rows.extension, unrest, situation.actuator_twists, done)
+    return Standpoint(poses, closed, rows.extension, unrest, situation, done)
 
 
 def _situation(
