@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from app.jobs.chosen_runs import load_runs as load_runs
     from app.jobs.comparing import CompareReport as CompareReport
     from app.jobs.comparing import compare as compare
+    from app.jobs.correcting import CorrectReport as CorrectReport
+    from app.jobs.correcting import correct as correct
     from app.jobs.discovering import DiagnosisReport as DiagnosisReport
     from app.jobs.discovering import DiscoveryReport as DiscoveryReport
     from app.jobs.discovering import diagnose as diagnose
@@ -66,6 +68,7 @@ _HOMES = {
     "AsyncStation": "pkmcal.async_station",
     "BadInput": "calib.errors",
     "CompareReport": "app.jobs.comparing",
+    "CorrectReport": "app.jobs.correcting",
     "DeviceError": "drivers.errors",
     "DiagnosisReport": "app.jobs.discovering",
     "DiscoveryReport": "app.jobs.discovering",
@@ -83,6 +86,7 @@ _HOMES = {
     "VerificationReport": "app.jobs.verifying",
     "choose_poses": "app.jobs.posing",
     "compare": "app.jobs.comparing",
+    "correct": "app.jobs.correcting",
     "design": "app.jobs.following_up",
     "diagnose": "app.jobs.discovering",
     "discover": "app.jobs.discovering",
@@ -101,6 +105,7 @@ __all__ = [
     "AsyncStation",
     "BadInput",
     "CompareReport",
+    "CorrectReport",
     "DeviceError",
     "DiagnosisReport",
     "DiscoveryReport",
@@ -119,6 +124,7 @@ __all__ = [
     "VerificationReport",
     "choose_poses",
     "compare",
+    "correct",
     "design",
     "diagnose",
     "discover",

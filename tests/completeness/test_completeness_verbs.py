@@ -40,6 +40,7 @@ ASKED: dict[str, tuple[str, ...] | None] = {
     "discover": ("discover", RUN),
     "apply": None,
     "undo": None,
+    "correct": ("correct", "{}/model.toml", "--pose", "0 0 220 0 0 0"),
     "verify": None,
     "iso9283": ("iso9283", "{}/cycles"),
     "report": ("report", RUN, "--out", "{}/report.html"),
@@ -86,6 +87,9 @@ def test_completeness_verb_answers_by_its_schema(
     words = ASKED[name]
     if words is None:
         return
+    if name == "correct":
+        assert run(["fit", RUN, "--save", str(tmp_path / "model.toml")]) == 0
+        capsys.readouterr()
     if name == "iso9283":
         campaign = ["simulate", "hexapod", "--poses", "3", "--cycles", "3"]
         assert run([*campaign, "--out", str(tmp_path / "cycles")]) == 0

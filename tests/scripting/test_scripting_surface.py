@@ -16,6 +16,8 @@ SIGNATURES = {
     "choose_poses": "machine=None, n=29, *, site=None, criterion='I', priors=True, sigma_um=None, "
     "angle_mdeg=None, candidates=2500, seed=1",
     "compare": "runs, *, add=(), model=None, propose=None, watch=None",
+    "correct": "model, poses, *, machine=None, payload=None, temperature=None, channels=None, "
+    "every=None, before=None, extrapolate=False",
     "design": "runs, discriminate, n=10, *, add=(), model=None, candidates=250, seed=1, watch=None",
     "diagnose": "runs, *, add=(), model=None, watch=None",
     "discover": "runs, *, add=(), model=None, watch=None",
@@ -47,6 +49,7 @@ FIELDS = {
     "ApplyReport": "written changes left_out snapshot kept check_before check_after noise_peak_um",
     "CompareReport": "effects readings rms_um noise_floor_um chi2_per_dof repeatability "
     "reference_repeatability structure together actuators worst_poses bad_readings advice proposed",
+    "CorrectReport": "machine model actuators effects left_out remarks channels poses",
     "DiagnosisReport": "baseline adequate candidates indistinguishable unexplained bad_readings "
     "unavailable not_on_this_machine advice",
     "DiscoveryReport": "steps effects adequate indistinguishable unexplained bad_readings "
