@@ -22,15 +22,13 @@ from calib.command import (
     pose_commands,
     pose_covariance,
 )
-from calib.command.identified import commandable
+from calib.command.identified import why_not
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import Poses
 from calib.mechanism.task import FULL, task_values
 
 PAYLOAD, TEMPERATURE = "payload_kg", "structure_temp_C"
-MEASURED = "it is of the measurement, not of the machine"
-OF_THE_POINT = "it moves the point that is read, which no command counters"
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,11 +57,7 @@ class Corrector:
         described = _machine_of(model, saved, machine)
         values = _values(saved, described)
         effects = chosen_effects(described, (), model)
-        left_out = {
-            e.id: MEASURED if e.kind == "measurement" else OF_THE_POINT
-            for e in effects
-            if not commandable(e)
-        }
+        left_out = {effect.id: why for effect in effects if (why := why_not(effect))}
         identified = Identified.from_values(
             described, values, effects, saved.load, saved.controller
         )

@@ -114,8 +114,19 @@ class Identified:
 
 
 def commandable(effect: Effect) -> bool:
-    """Whether a command can counter the effect: the machine's own, and not of the point read."""
-    return effect.kind == "machine" and getattr(effect, "acts_on", "actuator") != "point"
+    """Whether a command can counter the effect; :func:`why_not` says why it cannot."""
+    return not why_not(effect)
+
+
+def why_not(effect: Effect) -> str:
+    """Why no command counters an effect; empty if one does."""
+    if effect.kind != "machine":
+        return "it is of the measurement, not of the machine"
+    if getattr(effect, "acts_on", "actuator") == "point":
+        return "it moves the point that is read, which no command counters"
+    if "run" in effect.depends:
+        return "it happened in that run, and is over since the machine was referenced anew"
+    return ""
 
 
 def _found(

@@ -7,6 +7,7 @@ import pytest
 from command_cases import LOAD, around, drawn, machine_of, wanted_of
 
 from calib.command import History, Identified, Surroundings, commands_for, standpoint
+from calib.command.identified import commandable
 from calib.effects import catalogue, effect_named
 from calib.errors import BadInput
 from calib.formulas.effect_file import effect_from_text
@@ -180,6 +181,13 @@ def test_command_never_counters_what_only_the_measurement_does():
     assert Identified.from_values(machine, values, measured).effects == ()
 
 
+def test_command_never_counters_what_happened_in_one_run():
+    machine = machine_of("hexapod")
+    over = [effect_named(name, machine) for name in ("actuator-step", "warm-up")]
+    values = {"warm-up.run1.A": 0.1, "actuator-step.leg1": 0.2}
+    assert Identified.from_values(machine, values, over).effects == ()
+
+
 def test_command_settling_without_delays_is_the_product_that_the_run_knew():
     machine = machine_of("hexapod")
     effect = effect_named("settling", machine)
@@ -194,7 +202,7 @@ def test_command_settling_without_delays_is_the_product_that_the_run_knew():
 
 def test_command_stands_where_the_identification_says_that_the_readings_are():
     machine, generator = machine_of("hexapod"), np.random.default_rng(4)
-    effects = [e for e in catalogue(machine) if e.kind == "machine" and e.id != "creep"]
+    effects = [e for e in catalogue(machine) if commandable(e) and e.id != "creep"]
     identified = drawn(machine, effects, generator)
     poses = sample_poses(machine, 5, generator)
     run = prototype_run(machine, "hexapod", poses, machine.nominal, 0.005, generator).run

@@ -5,6 +5,7 @@ import pytest
 from command_cases import LOAD, MACHINES, around, drawn, machine_of, wanted_of
 
 from calib.command import Identified, commands_for, pose_commands, standpoint
+from calib.command.identified import commandable
 from calib.command.rows import rows_with_everything
 from calib.effects import catalogue
 from calib.mechanism.rigid import pose_difference
@@ -26,7 +27,7 @@ EVERY = [
     (name, effect)
     for name in MACHINES
     for effect in catalogue(machine_of(name))
-    if effect.kind == "machine"
+    if commandable(effect)
 ]
 
 
@@ -47,7 +48,7 @@ def test_command_of_every_effect_on_every_machine_brings_the_platform_there(name
 @pytest.mark.parametrize("name", MACHINES)
 def test_command_with_all_effects_together(name):
     machine, generator = machine_of(name), np.random.default_rng(13)
-    effects = [e for e in catalogue(machine) if e.kind == "machine"]
+    effects = [e for e in catalogue(machine) if commandable(e)]
     identified = drawn(machine, effects, generator)
     wanted, here = wanted_of(name), around(generator)
     found = commands_for(identified, wanted, here)
@@ -60,7 +61,7 @@ def test_command_with_all_effects_together(name):
 @pytest.mark.parametrize("name", MACHINES)
 def test_command_without_effects_is_the_inverse(name):
     machine = machine_of(name)
-    every = [e for e in catalogue(machine) if e.kind == "machine" and e.id != "redundancy"]
+    every = [e for e in catalogue(machine) if commandable(e) and e.id != "redundancy"]
     unknowns = [u for e in every for u in e.unknowns(rows_with_everything(e, machine, LOAD))]
     resting = {u.name: 1.0 if u.nonlinear else 0.0 for u in unknowns}
     identified = Identified.from_values(machine, resting, every, LOAD)
