@@ -1,7 +1,7 @@
 """Make what pkmcal needs in .venv beside this file, then run one of its jobs.
 
     python3 run.py demo          the main job on the mock hexapod, end to end
-    python3 run.py test          the tests (further arguments go to pytest)
+    python3 run.py test          the tests (further arguments go to pytest; -m long: the long ones)
     python3 run.py check         formatting, lint, types and layering
     python3 run.py bench [NAME]  the benchmarks, as ratios
     python3 run.py docs          the documentation as a site, in site/index.html

@@ -130,6 +130,7 @@ async def test_a_motor_is_jogged_and_homed_alone(lab: Lab, drive: CanopenControl
     assert state.actuators[1].position == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.timeout(300)
 def test_the_whole_job(lab: Lab) -> None:
     site = ("--site", "site.toml", "--unattended")

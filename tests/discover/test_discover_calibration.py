@@ -11,6 +11,7 @@ from calib.evidence.pairs import power, prefers
 from calib.evidence.tails import log_tail
 from calib.evidence.weighing import chi_squares
 
+pytestmark = pytest.mark.long
 SEED = 20
 
 

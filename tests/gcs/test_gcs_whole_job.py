@@ -73,6 +73,7 @@ def stored(lab: Lab) -> dict[str, float]:
     return {name: float.fromhex(value) for name, value in memory["values"].items()}
 
 
+@pytest.mark.long
 @pytest.mark.timeout(300)
 def test_the_whole_job_on_serial_line_and_tcp(lab: Lab) -> None:
     tcp = lab.site(lab.announcement["gcs"])

@@ -62,6 +62,7 @@ def frames_of(model: Model) -> State:
     return model.start(rotation, np.array([[2000.0], [0.0], [0.0]]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", shipped_machines())
 def test_errors_are_as_large_as_predicted(name: str) -> None:
     model = Model(campaign(name, 40))

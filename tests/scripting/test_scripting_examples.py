@@ -16,7 +16,10 @@ PRINTS = {
 
 
 @pytest.mark.timeout(180)
-@pytest.mark.parametrize("name", PRINTS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=pytest.mark.long) if n == "night_shift" else n for n in PRINTS],
+)
 def test_an_example_runs_and_prints_what_it_finds(name: str, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, str(EXAMPLES / f"{name}.py")],

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
 from session_mock import POSES, Mock
 
 from app.files.pose_table import poses_text
@@ -35,6 +36,7 @@ def small_change(mock: Mock) -> str:
     return json.dumps({"format": "pkm-fit/1", "effects": [], "parameters": parameters, **quality})
 
 
+@pytest.mark.long
 def test_a_killed_write_back_is_noticed_and_undone(
     mock_of: Callable[..., Mock], tmp_path: Path
 ) -> None:
