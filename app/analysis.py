@@ -1,23 +1,37 @@
 """Runs from the disk, effects by name, readings stacked: what every analysis begins with."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from app.files.models import chosen_effects
 from app.files.runs import read_runs
 from calib.discover.discovery import Refitter
-from calib.effects import Effect, catalogue
+from calib.effects import Effect, catalogue, effect_named
+from calib.look import first_look
 from calib.runs.stack import Rows, stack
 
 
 def load_rows(
     runs: tuple[str, ...], add: tuple[str, ...] = (), model: Path | None = None
 ) -> tuple[Rows, list[Effect]]:
-    """Read runs and find the effects that are asked for; raises BadInput with the place."""
+    """Read runs as they are meant, and find the effects of the model.
+
+    These are the ones asked for and those that the record itself shows. Raises BadInput with the
+    place.
+    """
     loaded = read_runs(runs)
     machine = loaded[0].machine
     effects = chosen_effects(machine, add, model)
-    return stack(machine, [one.run for one in loaded]), effects
+    rows = first_look(machine, [one.run for one in loaded])
+    asked = {effect.id for effect in effects}
+    shown = [effect_named(name, machine) for name in rows.known if name not in asked]
+    return rows, [*effects, *shown]
+
+
+def read_rows(runs: tuple[str, ...]) -> Rows:
+    """Read runs as they stand in their files; raises BadInput with the place."""
+    loaded = read_runs(runs)
+    return stack(loaded[0].machine, [one.run for one in loaded])
 
 
 def load_refitter(
@@ -34,3 +48,8 @@ def load_refitter(
     known = {effect.id: effect for effect in (*catalogue(rows.machine), *effects)}
     refit = Refitter(rows, tuple(known.values()), watch=watch)
     return refit, tuple(effect.id for effect in effects)
+
+
+def asked_for(refit: Refitter, begin: tuple[str, ...], add: Sequence[str]) -> tuple[str, ...]:
+    """Effects to begin a discovery with: those that the record shows are steps of their own."""
+    return tuple(name for name in begin if name not in refit.rows.known or name in add)

@@ -4,7 +4,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from app.analysis import load_rows
+from app.analysis import read_rows
 from calib.errors import BadInput
 from calib.runs.stack import Rows
 
@@ -58,4 +58,4 @@ def load_runs(runs: Runs) -> Rows:
     >>> rows.position.shape, rows.machine.name                               # doctest: +SKIP
     ((3, 200), 'hexapod')
     """
-    return load_rows(names_of(runs))[0]
+    return read_rows(names_of(runs))

@@ -10,7 +10,7 @@ import numpy as np
 from app.analysis import load_refitter
 from app.files.runs import outside_runs
 from app.jobs.chosen_runs import File, Runs, names_of, path_of
-from app.jobs.fitting import BadReadingEntry
+from app.jobs.fitting import BadReadingEntry, RemarkEntry
 from app.jobs.record import Record, Report
 from calib.discover.compare import RunComparison, compare_fit
 from calib.discover.compare_report import compare_report
@@ -108,6 +108,7 @@ class CompareReport(Report):
     actuators: tuple[ActuatorEntry, ...]
     worst_poses: tuple[WorstPoseEntry, ...]
     bad_readings: tuple[BadReadingEntry, ...]
+    record: tuple[RemarkEntry, ...]
     advice: str
     proposed: tuple[TermEntry, ...] = ()
     _found: RunComparison = field(repr=False, compare=False)

@@ -4,9 +4,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from app.analysis import load_refitter
+from app.analysis import asked_for, load_refitter
 from app.jobs.chosen_runs import File, Runs, names_of, path_of
-from app.jobs.fitting import BadReadingEntry, keep_model
+from app.jobs.fitting import BadReadingEntry, RemarkEntry, keep_model
 from app.jobs.record import Record, Report
 from calib.discover.discovery import discover_run, stage_of
 from calib.discover.report import diagnosis_report, discovery_report
@@ -70,6 +70,7 @@ class DiagnosisReport(Report):
     FORMAT: ClassVar[str] = "pkm-diagnosis/1"
     baseline: BaselineEntry
     adequate: bool
+    record: tuple[RemarkEntry, ...]
     candidates: tuple[CandidateEntry, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
     unexplained: UnexplainedEntry
@@ -100,9 +101,11 @@ class DiscoveryReport(Report):
     steps: tuple[StepEntry, ...]
     effects: tuple[str, ...]
     adequate: bool
+    record: tuple[RemarkEntry, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
     unexplained: UnexplainedEntry
     bad_readings: tuple[BadReadingEntry, ...]
+    unavailable: Mapping[str, str]
     parameters: tuple[SizeEntry, ...]
     refused: tuple[str, ...]
     advice: str
@@ -185,5 +188,5 @@ def discover(
     """
     names = names_of(runs)
     refit, begin = load_refitter(names, tuple(add), path_of(model), watch)
-    found = discover_run(refit, begin)
+    found = discover_run(refit, asked_for(refit, begin, add))
     return DiscoveryReport.of(discovery_report(found), _found=found, _runs=names)

@@ -12,6 +12,8 @@ from app.jobs.record import Record, Report
 from calib.discover.agreement import runs_at_odds
 from calib.identify import Fit, fit_report
 from calib.identify.staged import fit_effects
+from calib.look.judged import record_of
+from calib.runs.remark import plain_remarks
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,6 +22,24 @@ class BadReadingEntry(Record):
 
     line: int
     why: str
+    run: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RemarkEntry(Record):
+    """A hypothesis about the record itself, said before any physics.
+
+    ``lines`` of ``points.csv`` as (first, last); ``done`` about it for the analysis, ``remedy`` in
+    the files. Where it is not ``settled``, no model is called adequate.
+    """
+
+    name: str
+    says: str
+    lines: tuple[tuple[int, ...], ...]
+    evidence: str
+    done: str
+    remedy: str
+    settled: bool
     run: str = ""
 
 
@@ -62,6 +82,7 @@ class FitReport(Report):
     left_out_readings: int
     channels_left_aside: Mapping[str, str]
     remarks: tuple[str, ...]
+    record: tuple[RemarkEntry, ...]
     _fit: Fit = field(repr=False, compare=False)
     _runs: tuple[str, ...] = field(repr=False, compare=False)
 
@@ -116,7 +137,11 @@ def fit(runs: Runs, *, add: Sequence[str] = (), model: File | None = None) -> Fi
     rows, effects = load_rows(names, tuple(add), path_of(model))
     found = fit_effects(rows, effects)
     odds = runs_at_odds(found)
-    said = {**fit_report(found), "remarks": [f"{odds}."] if odds else []}
+    said = {
+        **fit_report(found),
+        "remarks": [f"{odds}."] if odds else [],
+        "record": plain_remarks(record_of(found)),
+    }
     return FitReport.of(said, _fit=found, _runs=names)
 
 

@@ -10,7 +10,9 @@ from calib.arrays import Array
 from calib.identify import Fit, fit_report
 from calib.identify.staged import fit_effects
 from calib.identify.starting import begin
+from calib.look.judged import record_of
 from calib.model import Model
+from calib.runs.remark import plain_remarks
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,4 +48,5 @@ def answer_of(runs: tuple[str, ...], found: Fit) -> FitAnswer:
     before = np.linalg.norm(nominal.residual[:, found.accepted], axis=0)
     after = np.linalg.norm(found.linear.residual[:, found.accepted], axis=0)
     effects = tuple(effect.id for effect in found.model.effects)
-    return FitAnswer(runs, effects, found, fit_report(found), before, after)
+    said = {**fit_report(found), "record": plain_remarks(record_of(found))}
+    return FitAnswer(runs, effects, found, said, before, after)

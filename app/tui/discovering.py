@@ -57,6 +57,7 @@ class Search:
     def of(runs: tuple[str, ...], effects: tuple[str, ...] = ()) -> "Search":
         """Load runs and look at the model with these effects."""
         rows, chosen = load_rows(runs, effects)
+        # What the record itself shows is in the model from the start.
         known = {effect.id: effect for effect in (*catalogue(rows.machine), *chosen)}
         search = Search(runs, Refitter(rows, tuple(known.values())))
         names = tuple(effect.id for effect in chosen)

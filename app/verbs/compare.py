@@ -12,6 +12,7 @@ from app import answer
 from app.analysis_options import model_options, watcher
 from app.files.runs import outside_runs
 from app.jobs.comparing import compare
+from app.show.record_words import excluded_lines, record_lines
 
 SHOWN = 6
 WIDTH = 13
@@ -63,6 +64,7 @@ def words(report: dict[str, Any]) -> str:
     """Say a comparison to a person."""
     model = "baseline" + "".join(f" + {name}" for name in report["effects"])
     lines = [
+        *record_lines(report),
         f"{report['readings']} readings; model: {model}",
         f"RMS {report['rms_um']:.2f} um (perfect model {report['noise_floor_um']:.2f} um), "
         f"chi-square per degree of freedom {report['chi2_per_dof']:.3f}",
@@ -91,8 +93,7 @@ def words(report: dict[str, Any]) -> str:
         )
     if "proposed" in report:
         lines += ["", *_terms(report["proposed"])]
-    for bad in report["bad_readings"]:
-        lines.append(f"excluded: line {bad['line']}: {bad['why']}")
+    lines += [f"excluded: {line}" for line in excluded_lines(report)]
     return "\n".join([*lines, "", report["advice"]])
 
 

@@ -11,6 +11,7 @@ import click
 from app import answer
 from app.analysis_options import model_options, watcher
 from app.jobs.discovering import diagnose
+from app.show.record_words import excluded_lines, record_lines
 
 
 @click.command()
@@ -32,6 +33,7 @@ def words(report: dict[str, Any]) -> str:
     """Say a diagnosis to a person."""
     base = report["baseline"]
     lines = [
+        *record_lines(report),
         f"model: baseline{''.join(' + ' + name for name in base['effects'])}",
         f"RMS {um(base['rms_um'])} (perfect model {um(base['noise_floor_um'])}), held-out poses "
         f"{um(base['holdout_rms_um'])} (perfect {um(base['holdout_floor_um'])}), "
@@ -48,8 +50,7 @@ def words(report: dict[str, Any]) -> str:
         channels = ", ".join(report["unexplained"]["channels"])
         lines += ["", f"Structure is left that no known effect explains; it depends on: {channels}"]
     lines += [*bad_lines(report), "", report["advice"]]
-    for name, why in report["unavailable"].items():
-        lines.append(f"(not asked: {name}, {why})")
+    lines += not_asked(report)
     if lacking := report["not_on_this_machine"]:
         lines.append(f"(not on this machine: {', '.join(lacking)}; pkmcal machine check says why)")
     return "\n".join(lines)
@@ -61,11 +62,15 @@ def um(value: float | None) -> str:
 
 
 def bad_lines(report: dict[str, Any]) -> list[str]:
-    """Excluded readings, one a line."""
+    """Excluded readings, one a line or in ranges."""
     if not report["bad_readings"]:
         return []
-    listed = [f"  line {bad['line']}: {bad['why']}" for bad in report["bad_readings"]]
-    return ["", "Excluded readings:", *listed]
+    return ["", "Excluded readings:", *(f"  {line}" for line in excluded_lines(report))]
+
+
+def not_asked(report: dict[str, Any]) -> list[str]:
+    """Effects that these readings cannot show, one a line."""
+    return [f"(not asked: {name}, {why})" for name, why in report["unavailable"].items()]
 
 
 def sizes(parameters: list[dict[str, Any]]) -> list[str]:

@@ -12,7 +12,8 @@ from app import answer
 from app.analysis_options import model_options, watcher
 from app.files.runs import outside_runs
 from app.jobs.discovering import discover
-from app.verbs.diagnose import bad_lines, sizes, um
+from app.show.record_words import record_lines
+from app.verbs.diagnose import bad_lines, not_asked, sizes, um
 
 
 @click.command()
@@ -59,6 +60,7 @@ def words(report: dict[str, Any]) -> str:
         for step in report["steps"]
     ]
     lines = [
+        *record_lines(report),
         answer.table(
             ("step", "RMS", "perfect", "held-out", "perfect", "chi2/dof"),
             steps,
@@ -76,7 +78,7 @@ def words(report: dict[str, Any]) -> str:
     if report["unexplained"]["significant"]:
         channels = ", ".join(report["unexplained"]["channels"])
         lines.append(f"Structure is left that no known effect explains; it depends on: {channels}")
-    return "\n".join([*lines, *bad_lines(report), "", report["advice"]])
+    return "\n".join([*lines, *bad_lines(report), "", report["advice"], *not_asked(report)])
 
 
 def _in_the_model(report: dict[str, Any]) -> list[str]:

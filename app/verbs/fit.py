@@ -12,6 +12,7 @@ from app import answer
 from app.analysis_options import model_options
 from app.files.runs import outside_runs
 from app.jobs.fitting import fit
+from app.show.record_words import excluded_lines, record_lines
 
 
 @click.command()
@@ -45,6 +46,7 @@ def command(
 def words(report: dict[str, Any]) -> str:
     """Say a fit to a person."""
     lines = [
+        *record_lines(report),
         f"{report['readings']} readings, effects: {', '.join(report['effects']) or 'none'}",
         "",
         answer.table(
@@ -67,7 +69,7 @@ def words(report: dict[str, Any]) -> str:
         lines += ["", *report["unidentified_words"]]
     if report["bad_readings"]:
         lines += ["", "Excluded readings:"]
-        lines += [f"  line {bad['line']}: {bad['why']}" for bad in report["bad_readings"]]
+        lines += [f"  {line}" for line in excluded_lines(report)]
     if report["left_out_readings"]:
         lines += ["", f"{report['left_out_readings']} readings lack a channel that an effect needs"]
     for name, why in report["channels_left_aside"].items():

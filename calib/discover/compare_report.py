@@ -1,5 +1,6 @@
 """A comparison of model and run as plain data (``pkm-compare/1``), in micrometres."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -7,11 +8,14 @@ import numpy as np
 from calib.discover.compare import RunComparison
 from calib.evidence.compare import Speaking
 from calib.evidence.repeats import PureError
+from calib.look.judged import record_of
+from calib.runs.remark import Remark, plain_remarks
 
 
 def compare_report(found: RunComparison) -> dict[str, Any]:
     """Repeatability first, then state variables, the one with the most structure first."""
     fit = found.fit
+    record = record_of(fit)
     return {
         "format": "pkm-compare/1",
         "effects": [effect.id for effect in fit.model.effects],
@@ -32,7 +36,8 @@ def compare_report(found: RunComparison) -> dict[str, Any]:
         "actuators": _actuators(found),
         "worst_poses": _worst(found),
         "bad_readings": [{"line": bad.line, "why": bad.why} for bad in fit.bad],
-        "advice": _advice(found),
+        "record": plain_remarks(record),
+        "advice": _advice(found, record),
     }
 
 
@@ -108,7 +113,10 @@ def _worst(found: RunComparison, count: int = 5) -> list[dict[str, Any]]:
     ]
 
 
-def _advice(found: RunComparison) -> str:
+def _advice(found: RunComparison, record: Sequence[Remark]) -> str:
+    first = [one for one in record if not one.settled]
+    if first:
+        return f"{first[0].says}. {first[0].remedy}."
     loud = [one.channel for one in found.speaking if one.significant]
     repeats = found.repeatability
     if repeats.dof and repeats.p_value < 0.01 and repeats.excess > 0.5:

@@ -120,8 +120,12 @@ class Refitter:
 
 
 def discover_run(refit: Refitter, begin: tuple[str, ...] = ()) -> Discovery:
-    """Find the effects that a run calls for, beginning with those that the operator put in."""
-    return discover(refit, begin, keep=begin)
+    """Find the effects that a run calls for, beginning with those that the operator put in.
+
+    Those that the record itself shows come first.
+    """
+    shown = tuple(name for name in refit.rows.known if name not in begin)
+    return discover(refit, begin, keep=(*begin, *shown), first=shown)
 
 
 def stage_of(discovery: Discovery, step: int = -1) -> RunStage:

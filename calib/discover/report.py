@@ -15,6 +15,8 @@ from calib.evidence.forward import Discovery
 from calib.identify.fitting import Fit
 from calib.identify.report import bad_readings, quality, um
 from calib.identify.starting import MOVED
+from calib.look.judged import judged, record_of, settled
+from calib.runs.remark import Remark, plain_remarks
 from calib.unknown import Estimate, estimates_of, linear_among
 
 FEW_POSES = 15
@@ -23,26 +25,29 @@ FEW_POSES = 15
 def diagnosis_report(found: RunDiagnosis) -> dict[str, Any]:
     """Answer of ``pkmcal diagnose --json``."""
     diagnosis = found.diagnosis
+    record = _record(found)
     return {
         "format": "pkm-diagnosis/1",
         "baseline": {
             "effects": [effect.id for effect in found.fit.model.effects],
             **_quality(found),
         },
-        "adequate": diagnosis.adequate,
+        "adequate": diagnosis.adequate and settled(record),
+        "record": plain_remarks(record),
         "candidates": [_candidate(found, finding) for finding in diagnosis.findings],
         "indistinguishable": [list(group) for group in diagnosis.indistinguishable],
         "unexplained": _unexplained(diagnosis),
         "bad_readings": bad_readings(found.fit),
         "unavailable": found.unavailable,
         "not_on_this_machine": not_defined(found.fit.model.machine),
-        "advice": advice(found),
+        "advice": advice(found, record),
     }
 
 
 def discovery_report(discovery: Discovery) -> dict[str, Any]:
     """Answer of ``pkmcal discover --json``."""
     last = stage_of(discovery).run
+    record = record_of(last.fit)
     return {
         "format": "pkm-discovery/1",
         "steps": [
@@ -54,14 +59,26 @@ def discovery_report(discovery: Discovery) -> dict[str, Any]:
             for number, step in enumerate(discovery.steps)
         ],
         "effects": list(discovery.last.effects),
-        "adequate": last.diagnosis.adequate,
+        "adequate": last.diagnosis.adequate and settled(record),
+        "record": plain_remarks(record),
         "indistinguishable": [list(group) for group in _groups(discovery)],
         "unexplained": _unexplained(last.diagnosis),
         "bad_readings": bad_readings(last.fit),
         "parameters": effect_parameters(last.fit),
         "refused": list(discovery.refused),
-        "advice": advice(last, discovery.refused),
+        "unavailable": last.unavailable,
+        "advice": advice(last, record, discovery.refused),
     }
+
+
+def _record(found: RunDiagnosis) -> tuple[Remark, ...]:
+    """What is said first: the effect that would be added is judged like those in the model."""
+    best = found.diagnosis.best
+    if best is None:
+        return record_of(found.fit)
+    effect = found.columns_of(best.name).effect
+    offered = judged(effect, found.outlook(best).estimates, found.fit)
+    return (*record_of(found.fit), *offered)
 
 
 def _groups(discovery: Discovery) -> list[tuple[str, ...]]:
@@ -136,8 +153,18 @@ def _unexplained(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def advice(found: RunDiagnosis, refused: Sequence[str] = ()) -> str:
-    """One sentence for the operator: what to do next; ``refused`` by the held-out poses."""
+def advice(found: RunDiagnosis, record: Sequence[Remark] = (), refused: Sequence[str] = ()) -> str:
+    """One sentence for the operator: what to do next; ``refused`` by the held-out poses.
+
+    What is wrong with the record comes before all physics.
+    """
+    first = [one for one in record if not one.settled]
+    if first:
+        return f"{first[0].says}. {first[0].remedy}; then ask again."
+    return _of_physics(found, refused)
+
+
+def _of_physics(found: RunDiagnosis, refused: Sequence[str]) -> str:
     diagnosis = found.diagnosis
     bad = len(found.fit.bad)
     excluded = f" {_readings(bad)} excluded: see bad_readings." if bad else ""

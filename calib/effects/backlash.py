@@ -13,6 +13,7 @@ class Backlash(Effect):
     kind = "machine"
     says = "a leg loses motion when it turns round: play in nut, bearing or gear"
     depends = ("direction",)
+    wrong_sign = "the rows stand in another order than they were measured in, or q counts backwards"
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``backlash.leg1`` ..., mm or rad."""

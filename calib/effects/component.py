@@ -140,6 +140,10 @@ class Effect(ABC):
         Columns of :class:`Rows` on which the extensions depend beside the pose: readings that
         agree in them share one closure. An effect that remembers names ``path`` (and ``time_s``
         if it matters how long the machine stood): it reads ``situation.rows.path``.
+    wrong_sign : str
+        What a negative value most likely says of the record; empty where both signs can be.
+    wrong_size : str
+        What a value that is no machine's most likely says of it.
     """
 
     id: str
@@ -147,6 +151,8 @@ class Effect(ABC):
     says: str
     channels: tuple[str, ...] = ()
     depends: tuple[str, ...] = ()
+    wrong_sign: str = ""
+    wrong_size: str = ""
 
     def lacking(self, machine: Machine) -> str:
         """Say what the machine file lacks for the effect to be defined; empty if it is."""

@@ -11,7 +11,7 @@ import numpy as np
 from calib.arrays import Array
 from calib.effects.component import Effect, Signature, Situation
 from calib.effects.tracker import rigid_motions
-from calib.mechanism.rigid import rotate
+from calib.mechanism.rigid import cross, rotate
 from calib.runs.stack import Rows
 from calib.unknown import Unknown
 
@@ -52,8 +52,8 @@ class FrameShift(Effect):
                 yield (float(moment), where)
 
     def refined(self, rows: Rows, trial: tuple[float, ...]) -> Iterator[tuple[float, ...]]:
-        """Every moment between the neighbouring ones that were tried."""
-        tried, every = _moments(rows), _every_moment(rows)
+        """Every moment between the neighbouring ones that were tried, within one time too."""
+        tried, every = _moments(rows), _between(rows, rows.moment)
         at = int(np.searchsorted(tried, trial[0]))
         low, high = tried[max(at - 1, 0)], tried[min(at + 1, tried.size - 1)]
         for moment in every[(every >= low) & (every <= high)]:
@@ -63,15 +63,33 @@ class FrameShift(Effect):
         """A rigid motion of everything read after the moment."""
         rows = situation.rows
         moment, where = values[6], values[7]
-        after = (rows.time_s >= moment).astype(np.float64)
+        after = (rows.moment >= moment).astype(np.float64)
         shape = np.zeros((8, 3, rows.count))
         if where > 0.5:
-            motions = rigid_motions(situation.base_point)
+            motions = _motions(situation.base_point, values[3:6])
             turned = [rotate(situation.frame_rotation, one) for one in motions]
             shape[:6] = np.stack(turned) * after
             return Signature(point=shape)
-        shape[:6] = rigid_motions(rows.nest) * after * rows.on_platform
+        shape[:6] = _motions(rows.nest, values[3:6]) * after * rows.on_platform
         return Signature(nest=shape)
+
+
+def _motions(point: Array, turn: Array) -> Array:
+    """Unit motions (6, 3, N) that, times the values, are the whole rigid motion by ``turn`` (3,).
+
+    exp([w]) p - p = w x V p with V = 1 + (1 - cos a) / a^2 [w] + (a - sin a) / a^3 [w]^2, a = |w|:
+    a tracker that was carried elsewhere turns by more than the first order can say.
+    """
+    angle = float(np.linalg.norm(turn))
+    w = turn[:, None]
+    if angle > 1e-3:
+        first, second = (1.0 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
+    else:
+        first, second = 0.5, 1.0 / 6.0
+    once = cross(w, point)
+    motions = rigid_motions(point + first * once + second * cross(w, once))
+    motions[:3] = rigid_motions(point)[:3]
+    return motions
 
 
 def _moments(rows: Rows) -> Array:
@@ -83,8 +101,13 @@ def _moments(rows: Rows) -> Array:
 
 
 def _every_moment(rows: Rows) -> Array:
-    """Moments between successive readings, away from the ends of the run."""
-    times = np.sort(rows.time_s)
+    """Moments between successive times, away from the ends of the run."""
+    return _between(rows, rows.time_s)
+
+
+def _between(rows: Rows, times: Array) -> Array:
+    """Moments between successive ``times`` (N,), away from the ends of the run."""
+    times = np.sort(times)
     edge = max(2, int(EDGE * times.size))
     inner = times[edge : times.size - edge]
     return np.asarray(0.5 * (inner[1:] + inner[:-1])[np.diff(inner) > 0])

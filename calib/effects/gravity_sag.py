@@ -81,6 +81,8 @@ class GravitySag(Effect):
     kind = "machine"
     says = "legs, rods or drives give way under the weight of platform and payload"
     depends = ("payload_kg",)
+    wrong_sign = "gravity in [load], or the sign of z, is the wrong way round"
+    wrong_size = "payload_kg, or a mass in [load], is not in kg (payload in grams?)"
 
     def lacking(self, machine: Machine) -> str:
         """Springs must be part of an elastic closure; actuators yield on any machine."""

@@ -31,6 +31,8 @@ class LegCompliance(Effect):
     kind = "machine"
     says = "legs or drives give way under the weight, each by a compliance of its own"
     depends = ("payload_kg",)
+    wrong_sign = "gravity in [load], or the sign of z, is the wrong way round"
+    wrong_size = "payload_kg, or a mass in [load], is not in kg (payload in grams?)"
 
     def lacking(self, machine: Machine) -> str:
         """The actuators must be what yields."""

@@ -25,6 +25,8 @@ class ThermalGrowth(Effect):
     says = "legs, rods or links grow with the temperature of the structure"
     channels = ("structure_temp_C",)
     depends = ("structure_temp_C",)
+    wrong_sign = "structure_temp_C is of something else, or counts the wrong way round"
+    wrong_size = "structure_temp_C is not in deg C"
 
     def lacking(self, machine: Machine) -> str:
         """Something must grow."""

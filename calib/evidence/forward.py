@@ -70,6 +70,7 @@ def discover(
     begin: tuple[str, ...] = (),
     *,
     keep: Sequence[str] = (),
+    first: Sequence[str] = (),
 ) -> Discovery:
     """Go from the effects ``begin`` to a model from which nothing known is missing.
 
@@ -80,9 +81,13 @@ def discover(
     begin : tuple of str
         Effects in the model at the start.
     keep : sequence of str
-        Effects that the operator has put in and that stay.
+        Effects that stay: those that the operator has put in, and ``first``.
+    first : sequence of str
+        Effects that are added before any is looked for.
     """
     steps = [Revision(refit(begin))]
+    for name in first:
+        steps.append(Revision(refit((*steps[-1].stage.effects, name)), added=name))
     refused: list[str] = []
     groups: list[tuple[str, ...]] = []
     while len(steps) <= MOST_STEPS:

@@ -9,7 +9,7 @@ import numpy as np
 from calib.arrays import Array, BoolArray
 from calib.evidence.problem import LinearProblem
 from calib.identify.optimum import optimise
-from calib.identify.readings import BadReading, strays
+from calib.identify.readings import MASKED, BadReading, strays
 from calib.identify.starting import bad_reading, begin
 from calib.mechanism.rigid import euler_rates, to_euler
 from calib.model.prediction import Model
@@ -158,7 +158,7 @@ def fit(
     BadInput
         If the readings cannot tie the frames, or do not belong to this machine.
     """
-    bad = [bad_reading(model, row, "masked by the operator") for row in masked]
+    bad = [bad_reading(model, row, MASKED) for row in masked]
     allowed = model.usable.copy()
     allowed[list(masked)] = False
     if gross is not None and start is not None:

@@ -18,6 +18,8 @@ from calib.scaled import Scaled, normal_matrix
 
 FALSE_ALARM = 1e-3
 """Probability that a run without a stray has a reading flagged."""
+MASKED = "masked by the operator"
+"""Said of readings that were left out on purpose."""
 MOST_STRAYS = 0.1
 """Part of the readings beyond which misfit is no matter of single readings."""
 

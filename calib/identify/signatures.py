@@ -37,8 +37,10 @@ def effect_columns(fit: Fit, effects: Sequence[Effect]) -> list[EffectColumns]:
     """Signatures of every effect that these readings can show and the model does not hold."""
     rows = fit.model.rows
     held = {effect.id for effect in fit.model.effects}
+    # A moment with nothing but excluded readings on one side could not be told from any other.
+    tried = rows if fit.accepted.all() else rows.take(fit.accepted)
     return [
-        columns_at(fit, effect, tuple(effect.trials(rows)))
+        columns_at(fit, effect, tuple(effect.trials(tried)))
         for effect in effects
         if effect.id not in held and not effect.unavailable(rows)
     ]

@@ -1,6 +1,7 @@
 """Fits of models with effects, one after the other: nonlinear unknowns are searched first."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,6 +33,10 @@ def fit_effects(
     for count in range(done, len(effects)):
         if effects[count].unavailable(rows):
             continue  # the model refuses it in words
+        if effects[count].id in rows.known:
+            latest = _fitted(rows, effects[:count], masked, latest)
+            latest = _known(latest, effects[: count + 1], masked)
+            continue
         if not any(unknown.nonlinear for unknown in effects[count].unknowns(rows)):
             continue
         latest = _fitted(rows, effects[:count], masked, latest)
@@ -55,6 +60,21 @@ def _fitted(
     rest = model.effects_at_rest
     values = (*state.effects, *rest[len(state.effects) :])
     return fit(model, start=begin_at(state, values), masked=masked, gross=latest.gross)
+
+
+def _known(latest: Fit, effects: Sequence[Effect], masked: Sequence[int]) -> Fit:
+    """Fit one more effect that the record shows, beginning at the values that it shows.
+
+    Readings that stand where no nest can be are looked for anew, without what it moves.
+    """
+    rows = latest.model.rows
+    model = Model(rows, effects)
+    values = rows.known[effects[-1].id]
+    nearby = begin_at(latest.linear.state, (*latest.linear.state.effects, values))
+    moved = model.predict(nearby) - latest.model.predict(latest.linear.state)
+    without = fit(Model(replace(rows, position=rows.position - moved), effects[:-1]), masked=masked)
+    start = begin_at(without.linear.state, (*without.linear.state.effects, values))
+    return fit(model, start=start, masked=masked, gross=without.gross)
 
 
 def begin_at(state: State, values: tuple[Array, ...]) -> State:

@@ -30,8 +30,8 @@ def begin(model: Model, allowed: BoolArray) -> tuple[Linearised, list[BadReading
         If too few readings stand where the machine's nests can be.
     """
     base = model.base_points()
-    state, linear = _aligned(model, base, allowed)
-    slack = _slack(model, linear)
+    state, linear = aligned(model, base, allowed)
+    slack = slack_of(model, linear)
     apart = np.sqrt(np.sum(linear.residual**2, axis=0))
     if np.all(apart[allowed] < slack[allowed]):
         return linear, []
@@ -39,7 +39,7 @@ def begin(model: Model, allowed: BoolArray) -> tuple[Linearised, list[BadReading
     return model.linearise(state), bad
 
 
-def _aligned(model: Model, base: Array, allowed: BoolArray) -> tuple[State, Linearised]:
+def aligned(model: Model, base: Array, allowed: BoolArray) -> tuple[State, Linearised]:
     """Align all readings of each run."""
     rows = model.rows
     rotation, position = np.zeros((3, 3, model.frames)), np.zeros((3, model.frames))
@@ -65,7 +65,7 @@ def _aligned_robustly(
     bad: list[BadReading] = []
     for run in range(model.frames):
         here = np.flatnonzero((rows.run == run) & allowed)
-        slack[here] += _disagreement(model, base, here, slack)
+        slack[here] += disagreement(model, base, here, slack)
         R, t, inside = robust_align(base[:, here], rows.position[:, here], slack[here])
         if inside.sum() < max(6, MAJORITY * here.size) and inside.sum() < here.size:
             raise BadInput(
@@ -87,7 +87,7 @@ def _aligned_robustly(
     return model.start(rotation, position), bad
 
 
-def _disagreement(model: Model, base: Array, here: IntArray, slack: Array) -> float:
+def disagreement(model: Model, base: Array, here: IntArray, slack: Array) -> float:
     """How far (mm) the nominal machine is off as a whole, seen from the nests on the base.
 
     These are exact and know no machine: where they fit one another at every visit, and not the
@@ -144,7 +144,7 @@ def _expected(model: Model, row: int, R: Array, t: Array) -> dict[str, Array]:
     return {name: R @ place + t for name, place in places.items()}
 
 
-def _slack(model: Model, linear: Linearised) -> Array:
+def slack_of(model: Model, linear: Linearised) -> Array:
     """How far (N,) a good reading may be from the aligned nominal machine, mm.
 
     Six sigmas of what the tolerances can do, the alignment's share included, plus a millimetre

@@ -114,7 +114,7 @@ class Model:
         return usable
 
     @cached_property
-    def _states(self) -> tuple[IntArray, IntArray]:
+    def states(self) -> tuple[IntArray, IntArray]:
         """Representative readings (M,) of distinct machine states, and each reading's state."""
         depends = dict.fromkeys(name for e in self.effects for name in e.depends)
         columns = [self.rows.column(n) for n in depends if self.rows.has(n)]
@@ -125,7 +125,7 @@ class Model:
     @cached_property
     def nominal_configuration(self) -> Configuration:
         """The nominal machine closed at every distinct machine state."""
-        first, _ = self._states
+        first, _ = self.states
         extension = self.rows.extension[:, first]
         return self._closed(extension, self.machine.nominal, None, self.machine)
 
@@ -144,7 +144,7 @@ class Model:
 
     def base_points(self) -> Array:
         """SMR centres (3, N) of the nominal machine in the base frame, mm."""
-        poses, (_, inverse) = self.nominal_configuration.poses, self._states
+        poses, (_, inverse) = self.nominal_configuration.poses, self.states
         turned = rotate(poses.rotation[:, :, inverse], self.rows.nest)
         return np.where(self.rows.on_platform, poses.position[:, inverse] + turned, self.rows.nest)
 
@@ -157,7 +157,7 @@ class Model:
             Naming the reading at which the machine does not close.
         """
         rows, settled = self.rows, self._settled(state)
-        closed, (_, inverse) = settled.closed, self._states
+        closed, (_, inverse) = settled.closed, self.states
         jacobians = pose_jacobians(settled.closing, closed, settled.parameters)
         base, turned, point = self._placed(state, settled)
         situation = Situation(
@@ -189,7 +189,7 @@ class Model:
 
     def _placed(self, state: State, settled: "_Settled") -> tuple[Array, Array, Array]:
         """SMR centres (3, N): base frame; the same in the tracker's axes; tracker frame."""
-        rows, poses, (_, inverse) = self.rows, settled.closed.poses, self._states
+        rows, poses, (_, inverse) = self.rows, settled.closed.poses, self.states
         nest = rows.nest + change_of(settled.signatures, "nest", rows.nest)
         twist = change_of(settled.signatures, "twist", np.zeros((6, rows.count)))
         arm = rotate(poses.rotation[:, :, inverse], nest)
@@ -203,7 +203,7 @@ class Model:
 
         An effect's extension depends on the pose that it changes, weakly: the two are iterated.
         """
-        rows, (first, _) = self.rows, self._states
+        rows, (first, _) = self.rows, self.states
         started = any(np.any(linear) for linear in self._linear(state))
         if state.situation is None and started:
             without = self.effects_at_rest
@@ -245,7 +245,7 @@ class Model:
         closed = forward(machine, extension, parameters, start)
         if not closed.converged.all():
             state = int(np.argmin(closed.converged))
-            row = int(self._states[0][state])
+            row = int(self.states[0][state])
             raise BadInput(
                 "the machine does not close at these actuator coordinates",
                 place=self.rows.place(row),

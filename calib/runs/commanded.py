@@ -98,6 +98,19 @@ class CommandedPath:
         return np.sign(self.step)
 
     @cached_property
+    def moment(self) -> Array:
+        """Time (M,) in s of each row; rows of one time are spread over half the gap to the next."""
+        moment = self.time_s.copy()
+        new = (self.before < 0) | (np.diff(self.time_s, prepend=-np.inf) != 0.0)
+        start = np.flatnonzero(new)
+        many = np.diff(np.append(start, self.count))
+        last = np.append(self.before[start[1:]] < 0, True)
+        gap = np.where(last, 1.0, np.diff(self.time_s[start], append=0.0))
+        for first, count, wide in zip(start, many, gap, strict=True):
+            moment[first : first + count] += 0.5 * wide * np.arange(count) / count
+        return moment
+
+    @cached_property
     def stop(self) -> IntArray:
         """Number (M,) of the stop at which each row is: rows between which nothing moved share it.
 

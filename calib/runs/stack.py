@@ -1,7 +1,7 @@
 """The readings of one or several runs of a machine, stacked for the model."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,7 @@ from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.runs.commanded import CommandedPath, joined_paths
 from calib.runs.record import Run, holdout_folds
+from calib.runs.remark import Remark
 
 STATES = ("q", "extension", "direction", "step", "time_s", "progress", "run", "path")
 """State columns that every reading has; all others are channels."""
@@ -43,6 +44,10 @@ class Rows:
         Hold-out fold of whole poses, -1 for reference readings.
     channels : dict of (N,)
         State readings; nan where a run has none.
+    remarks : tuple of Remark
+        What is wrong with the record itself, and what was done about it (calib.look).
+    known : mapping of str to (U,)
+        Effects that the record itself shows, with values near which they are found.
     """
 
     machine: Machine
@@ -63,6 +68,8 @@ class Rows:
     on_platform: BoolArray
     fold: IntArray
     channels: dict[str, Array]
+    remarks: tuple[Remark, ...] = ()
+    known: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -78,6 +85,11 @@ class Rows:
     def step(self) -> Array:
         """Last change (n, N) of each actuator itself, with its sign; 0 before the first."""
         return self.path.step[:, self.at]
+
+    @cached_property
+    def moment(self) -> Array:
+        """Time (N,) in s of each reading; those of one time one after the other, as in the file."""
+        return self.path.moment[self.at]
 
     def take(self, which: Selection) -> "Rows":
         """Readings selected by index, slice or mask; what led to each stays as it was."""
@@ -151,6 +163,8 @@ def stack(machine: Machine, runs: Sequence[Run]) -> Rows:
             for name in names
         },
         path=joined_paths([part.path for part in parts]),
+        remarks=(),
+        known={},
         at=np.concatenate(
             [part.at + start for part, start in zip(parts, starts[:-1], strict=True)]
         ),

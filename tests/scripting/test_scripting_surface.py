@@ -48,15 +48,16 @@ FIELDS = {
     "AcceptReport": "accepted",
     "ApplyReport": "written changes left_out snapshot kept check_before check_after noise_peak_um",
     "CompareReport": "effects readings rms_um noise_floor_um chi2_per_dof repeatability "
-    "reference_repeatability structure together actuators worst_poses bad_readings advice proposed",
+    "reference_repeatability structure together actuators worst_poses bad_readings record advice "
+    "proposed",
     "CorrectReport": "machine model actuators effects left_out remarks channels poses",
-    "DiagnosisReport": "baseline adequate candidates indistinguishable unexplained bad_readings "
-    "unavailable not_on_this_machine advice",
-    "DiscoveryReport": "steps effects adequate indistinguishable unexplained bad_readings "
-    "parameters refused advice",
+    "DiagnosisReport": "baseline adequate record candidates indistinguishable unexplained "
+    "bad_readings unavailable not_on_this_machine advice",
+    "DiscoveryReport": "steps effects adequate record indistinguishable unexplained "
+    "bad_readings unavailable parameters refused advice",
     "FitReport": "effects readings chi2_per_dof rms_um noise_floor_um holdout_rms_um "
     "holdout_floor_um parameters unidentified unidentified_words bad_readings left_out_readings "
-    "channels_left_aside remarks",
+    "channels_left_aside remarks record",
     "FollowUpReport": "machine discriminate model runs conditions right_now right_then poses "
     "advice",
     "GridReport": "machine workspace_scale box poses",

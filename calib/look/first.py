@@ -1,0 +1,121 @@
+"""The first look at runs: plain hypotheses about the record, before any physics.
+
+Row by row first (readings that are none, temperatures, labels, units), then against the nominal
+machine (where the readings stand), then against a fit (what is left). What is certain is mended for
+the analysis and said; nothing is changed in the files.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from calib.arrays import Array
+from calib.look.labels import any_labels, mirrored_table, other_labels
+from calib.look.load import load_and_payload
+from calib.look.misfit import look_at_misfit
+from calib.look.moved import moved_station, parts_of
+from calib.look.places import Places, places_of
+from calib.look.pose_labels import pose_labels
+from calib.look.proposal import Proposal
+from calib.look.repeats import no_measurements
+from calib.look.seats import displaced_seat
+from calib.look.sigmas import sigmas
+from calib.look.temperatures import temperatures
+from calib.look.travel import check_travel
+from calib.mechanism.description import Machine
+from calib.runs.record import Run
+from calib.runs.remark import Remark
+from calib.runs.stack import Rows, stack
+
+MOST_ROUNDS = 4
+"""Hypotheses about places that may hold at once."""
+_Known = Mapping[str, Array]
+
+
+def first_look(machine: Machine, runs: Sequence[Run]) -> Rows:
+    """Look at runs and stack them as they are meant.
+
+    Returns
+    -------
+    Rows
+        ``remarks`` says what was found and done, ``known`` which effects the record itself shows.
+
+    Raises
+    ------
+    BadInput
+        For coordinates that are nowhere near the actuators' travel.
+    """
+    remarks: list[Remark] = []
+    looked: list[Run] = []
+    known: _Known = {}
+    for run in runs:
+        check_travel(machine, run)
+        run, of_rows = _rows_alone(machine, run)
+        parts, of_places, shown = _places(machine, run)
+        if shown and len(runs) > 1:
+            parts = _parted(machine, run)
+            shown = {}
+        if len(parts) == 1:
+            parts, of_misfit, more = look_at_misfit(machine, parts[0], shown, alone=len(runs) == 1)
+            shown = {**shown, **more}
+        else:
+            of_misfit = []
+        remarks += [*of_rows, *of_places, *of_misfit]
+        looked += parts
+        known = shown
+    return replace(stack(machine, looked), remarks=tuple(remarks), known=known)
+
+
+def _rows_alone(machine: Machine, run: Run) -> tuple[Run, list[Remark]]:
+    """What the rows tell by themselves."""
+    looked, remarks = no_measurements(run)
+    if not looked.measured.any():
+        return run, remarks  # the fit says that there is nothing
+    looked, found = temperatures(looked)
+    remarks += found
+    looked, found = load_and_payload(looked)
+    remarks += found
+    looked, found = sigmas(looked)
+    remarks += found
+    looked, found = pose_labels(machine, looked)
+    return looked, [*remarks, *found]
+
+
+def _places(machine: Machine, run: Run) -> tuple[list[Run], list[Remark], _Known]:
+    """What explains readings that stand where no nest can be, the best hypothesis first."""
+    remarks: list[Remark] = []
+    for _ in range(MOST_ROUNDS):
+        places = places_of(machine, run)
+        if places is None:
+            break
+        _, inside = places.majority
+        count = int(inside.sum())
+        if inside.size - count < places.limit:
+            break
+        best = _best(places, count)
+        if best is None:
+            break
+        run, remark = best.take()
+        remarks.append(remark)
+        if remark.name == "station-moved":
+            parts = [run] if best.known else parts_of(places)
+            return parts, remarks, best.known
+    return [run], remarks, {}
+
+
+def _best(places: Places, count: int) -> Proposal | None:
+    """The proposal that explains most readings, where it explains clearly more than ``count``."""
+    best: Proposal | None = None
+    for propose in (other_labels, moved_station, mirrored_table, displaced_seat, any_labels):
+        if best is not None and best.explained > places.rows.count - places.limit:
+            break
+        found = propose(places)
+        if found is None or found.explained < count + places.limit:
+            continue
+        if best is None or found.explained > best.explained:
+            best = found
+    return best
+
+
+def _parted(machine: Machine, run: Run) -> list[Run]:
+    places = places_of(machine, run)
+    return [run] if places is None else parts_of(places)

@@ -1,0 +1,270 @@
+"""What a fit leaves, asked of the record: a unit of the uncertainties, a step, a seat.
+
+These are smaller than what the drawing's machine alone can show (a station moved by 0.2 mm, an
+SMR 0.3 mm higher), so the fitted geometry is projected out: with the whitened Jacobian J of the fit
+and its covariance C, columns A have the weight V = A A^T - A J^T C J A^T and the scores s = A e;
+freeing them lowers chi-square by s^T V^-1 s. All moments are tried: sums over the readings from
+one on.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from calib.arrays import Array, BoolArray
+from calib.effects import effect_named
+from calib.effects.tracker import rigid_motions
+from calib.errors import BadInput
+from calib.identify.fitting import Fit
+from calib.identify.staged import fit_effects
+from calib.look.seats import ALONG, lifted, normal_of, seated
+from calib.mechanism.description import Machine
+from calib.mechanism.rigid import rotate
+from calib.runs.record import Run
+from calib.runs.remark import Remark, ranges
+from calib.runs.stack import stack
+
+LOUD = 2.0
+"""Chi-square per degree of freedom from which on the record itself is in question."""
+FALL = 100.0
+"""Least fall of chi-square by which a step or a seat is held."""
+SHARE = 0.6
+"""Least part of the misfit that a step must explain."""
+SEAT_SHARE = 0.9
+"""Least part of the misfit that a seat must explain: angles of the tracker bend nests alike."""
+CLEAR = 30.0
+"""Fall of chi-square by which it must beat what else could step at that moment."""
+LEAST = 3
+"""Readings on either side of a step."""
+SMALLEST_SEAT = 0.1
+"""Offset of a nest, mm, below which it is a matter of the effect nest-offset."""
+UNIT = (1.0 / 3000.0, 1.0 / 300.0)
+"""Scatter over stated sigmas that says um were written for mm."""
+ABSURD_MM = 0.3
+"""Stated sigma, mm, that no laser tracker has."""
+_Known = Mapping[str, Array]
+
+
+def look_at_misfit(
+    machine: Machine, run: Run, known: _Known, *, alone: bool
+) -> tuple[list[Run], list[Remark], _Known]:
+    """Fit a run as it is meant by now, and look at what is left.
+
+    Parameters
+    ----------
+    machine : Machine
+    run : Run
+    known : mapping
+        Effects that the record has shown by now.
+    alone : bool
+        Whether this is the only run: a step is then an effect of the model.
+    """
+    fitted = _fit(machine, run, known)
+    if fitted is None or not fitted.dof > 0:
+        return [run], [], {}
+    scatter = float(np.sqrt(fitted.chi2_per_dof))
+    sigma = float(np.median(np.sqrt(np.einsum("iin->in", fitted.model.rows.covariance))))
+    if UNIT[0] < scatter < UNIT[1] and sigma > ABSURD_MM:
+        return _in_um(run, sigma, scatter)
+    if fitted.chi2_per_dof < LOUD or known:
+        return [run], [], {}
+    found = _step(fitted) if alone else None
+    seat = _seat(fitted)
+    if found is not None and (seat is None or found.fall > seat.fall):
+        return [run], [_step_remark(fitted, found)], {"frame-shift": found.values}
+    if seat is not None:
+        return _seated(machine, run, fitted, seat)
+    return [run], [], {}
+
+
+def _fit(machine: Machine, run: Run, known: _Known) -> Fit | None:
+    try:
+        rows = replace(stack(machine, [run]), known=known)
+        return fit_effects(rows, [effect_named(name, machine) for name in known])
+    except BadInput:
+        return None  # the fit that was asked for says it
+
+
+def _in_um(run: Run, sigma: float, scatter: float) -> tuple[list[Run], list[Remark], _Known]:
+    remark = Remark(
+        "sigma-in-um",
+        f"sx, sy, sz look like um: {sigma:.3g} means {sigma:.3g} mm",
+        (),
+        f"The readings scatter {scatter:.2g} times as much as that says",
+        "Read as um",
+        "Write sx, sy, sz in mm",
+        True,
+        run.source,
+    )
+    return [replace(run, covariance=1e-6 * run.covariance)], [remark], {}
+
+
+@dataclass(frozen=True, eq=False)
+class _Scan:
+    """Fall of chi-square (M,) if columns act from each accepted reading on, and their sizes."""
+
+    fall: Array
+    sizes: Array
+
+
+def _scan(fitted: Fit, columns: Array, *, early: bool = False) -> _Scan:
+    """Let columns (k, 3, A) act from reading m on (early: up to it), for every m of A accepted."""
+    jacobian = fitted.linear.jacobian[:, :, fitted.accepted]
+    residual = fitted.linear.whitened[:, fitted.accepted]
+    weights = np.einsum("kin,lin->nkl", columns, columns)
+    scores = np.einsum("kin,in->nk", columns, residual)
+    mixed = np.einsum("pin,kin->npk", jacobian, columns)
+    weights, scores, mixed = (_summed(one, early=early) for one in (weights, scores, mixed))
+    taken = np.einsum("npk,pq,nql->nkl", mixed, fitted.step_covariance, mixed, optimize=True)
+    weights = weights - taken
+    size = np.sqrt(np.maximum(np.einsum("nkk->nk", weights), 1e-300))
+    scaled = weights / size[:, :, None] / size[:, None, :] + 1e-6 * np.eye(columns.shape[0])
+    beta = np.linalg.solve(scaled, (scores / size)[:, :, None])[:, :, 0]
+    return _Scan(np.sum(beta * scores / size, axis=1), beta / size)
+
+
+def _summed(values: Array, *, early: bool) -> Array:
+    if early:
+        return np.asarray(np.cumsum(values, axis=0))
+    return np.asarray(np.cumsum(values[::-1], axis=0)[::-1])
+
+
+def _whitened(fitted: Fit, motions: Array) -> Array:
+    """Motions (k, 3, N) in the base frame as whitened columns (k, 3, A)."""
+    situation, rows = fitted.linear.situation, fitted.model.rows
+    turned = np.stack([rotate(situation.frame_rotation, one) for one in motions])
+    whitened = np.einsum("ijn,kjn->kin", rows.whitener, turned)
+    return np.asarray(whitened[:, :, fitted.accepted])
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """A frame that steps: the row, the values of ``frame-shift``, and what it explains."""
+
+    row: int
+    values: Array
+    fall: float
+
+
+def _step(fitted: Fit) -> _Step | None:
+    """A step of the base that explains most of the misfit, better than anything else that steps."""
+    situation, rows = fitted.linear.situation, fitted.model.rows
+    kept = np.flatnonzero(fitted.accepted)
+    inner = slice(LEAST, kept.size - LEAST + 1)
+    base = _scan(fitted, _whitened(fitted, rigid_motions(situation.base_point)))
+    fall = base.fall[inner]
+    if fall.size == 0:
+        return None
+    at = int(np.argmax(fall)) + LEAST
+    best = float(base.fall[at])
+    if best < max(FALL, SHARE * (fitted.chi2 - fitted.dof)):
+        return None
+    others = [situation.actuator_columns[[k]] for k in range(len(rows.machine.actuators))]
+    tool = rigid_motions(rows.nest) * rows.on_platform
+    turned = np.stack([rotate(situation.rotation, one) for one in tool])
+    others.append(np.einsum("ijn,kjn->kin", situation.whitened_frame, turned))
+    rivals = [_scan(fitted, one[:, :, fitted.accepted]).fall[inner].max() for one in others]
+    drift = rigid_motions(situation.point) * rows.progress
+    slow = np.einsum("ijn,kjn->kin", rows.whitener, drift)[:, :, fitted.accepted]
+    rivals.append(_scan(fitted, slow).fall[0])
+    if best < max(rivals) + CLEAR:
+        return None
+    row = int(kept[at])
+    moment = 0.5 * (rows.moment[kept[at - 1]] + rows.moment[row])
+    return _Step(row, np.concatenate([base.sizes[at], [moment, 1.0]]), best)
+
+
+def _step_remark(fitted: Fit, found: _Step) -> Remark:
+    rows = fitted.model.rows
+    middle = fitted.linear.situation.base_point.mean(axis=1)[:, None]
+    moved = np.tensordot(found.values[:6], rigid_motions(middle), axes=1)
+    size = float(np.linalg.norm(moved))
+    told = f"{size:.3g} mm" if size >= 1.0 else f"{1000 * size:.0f} um"
+    return Remark(
+        "station-moved",
+        f"The tracker or the base was moved during the run: by {told} before line "
+        f"{rows.line[found.row]} ({rows.time_s[found.row]:.0f} s)",
+        ranges(rows.line[found.row :], rows.line),
+        f"One step of the frame explains "
+        f"{100 * found.fall / max(fitted.chi2 - fitted.dof, found.fall):.0f} % of the misfit",
+        "The step is in the model as frame-shift; nothing is excluded for it",
+        "Nothing, or begin a new run after the move; fasten what was moved",
+        True,
+        rows.runs[0].source,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Seat:
+    """A nest that is off by ``offset`` (3,) mm in the rows ``which`` (N,).
+
+    ``room``: in the base frame, whatever the platform does; else in the platform frame.
+    """
+
+    name: str
+    room: bool
+    which: BoolArray
+    offset: Array
+    fall: float
+
+
+def _seat(fitted: Fit) -> _Seat | None:
+    """The nest whose offset along the normal, in the whole run or a part, explains the misfit."""
+    rows = fitted.model.rows
+    header = rows.runs[0].header
+    names = np.array(rows.nest_name, dtype=object)
+    kept = np.flatnonzero(fitted.accepted)
+    best: _Seat | None = None
+    for name in header.platform_nests:
+        own = (names == name) & fitted.accepted
+        at = np.flatnonzero(own[kept])
+        if at.size <= LEAST:
+            continue
+        for room, early in product((False, True), (False, True)):
+            normal = np.array([0.0, 0.0, 1.0]) if room else normal_of(header)
+            tried = at[LEAST:] if early else at[: at.size - LEAST]
+            scan = _scan(fitted, _seat_columns(fitted, own, room=room), early=early)
+            edge = int(tried[np.argmax(scan.fall[tried])])
+            which = own & ((np.arange(own.size) <= kept[edge]) == early)
+            which[kept[edge]] = True
+            size = float(np.linalg.norm(scan.sizes[edge]))
+            if size < SMALLEST_SEAT or abs(normal @ scan.sizes[edge]) < ALONG * size:
+                continue
+            found = _Seat(name, room, which, scan.sizes[edge], float(scan.fall[edge]))
+            if best is None or found.fall > best.fall:
+                best = found
+    if best is None or best.fall < max(FALL, SEAT_SHARE * (fitted.chi2 - fitted.dof)):
+        return None
+    return best
+
+
+def _seat_columns(fitted: Fit, which: BoolArray, *, room: bool) -> Array:
+    """Whitened columns (3, 3, A) of moving the SMR of some readings, platform or base frame."""
+    situation = fitted.linear.situation
+    unit = np.repeat(np.eye(3)[:, :, None], which.size, axis=2) * which
+    turned = unit if room else np.stack([rotate(situation.rotation, one) for one in unit])
+    whitened = np.einsum("ijn,kjn->kin", situation.whitened_frame, turned)
+    return np.asarray(whitened[:, :, fitted.accepted], dtype=np.float64)
+
+
+def _seated(
+    machine: Machine, run: Run, fitted: Fit, seat: _Seat
+) -> tuple[list[Run], list[Remark], _Known]:
+    """Move the nest to where it was read; a second fit corrects what the first one was bent by."""
+    lines = fitted.model.rows.line[seat.which]
+    frame = fitted.linear.state.frame_rotation[:, :, 0]
+
+    def taken(offset: Array) -> tuple[Run, Remark]:
+        if seat.room:
+            return lifted(run, seat.name, lines, offset, frame)
+        return seated(run, seat.name, lines, offset)
+
+    moved, remark = taken(seat.offset)
+    again = _fit(machine, moved, {})
+    if again is not None:
+        here = np.isin(again.model.rows.line, lines)
+        more = _scan(again, _seat_columns(again, here, room=seat.room)).sizes[0]
+        moved, remark = taken(seat.offset + more)
+    return [moved], [remark], {}

@@ -1,0 +1,115 @@
+"""Where the readings of a run stand, seen by the nominal machine: what the gross hypotheses share.
+
+A hypothesis changes the record (labels, the nest table, the frame from some reading on) and is
+worth the readings that then stand where their nests can be. It is held where it explains clearly
+more of them than the record as it stands: one that moves forty readings is tried against the
+exclusion of forty.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from calib.arrays import Array, BoolArray
+from calib.errors import BadInput
+from calib.frames import align
+from calib.identify.alignment import collinear, misfit, robust_align
+from calib.identify.starting import aligned, disagreement, slack_of
+from calib.mechanism.description import Machine
+from calib.mechanism.rigid import rotate
+from calib.model.prediction import Model
+from calib.runs.record import Run
+from calib.runs.stack import Rows, stack
+
+FEW = 4
+"""Wrong readings up to so many, or this part of a run, are matters of single readings."""
+PART = 0.03
+Frame = tuple[Array, Array]
+"""Rotation (3, 3) and position (3,) of the base in the tracker frame."""
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """A run's N readings beside where the nominal machine had the nests.
+
+    Attributes
+    ----------
+    run, rows : Run, Rows
+    position, rotation : (3, N), (3, 3, N)
+        The platform in the base frame, by the nominal machine.
+    base : (3, N)
+        Where the labelled nest stood, base frame, mm.
+    slack : (N,)
+        How far from it a good reading may be, mm.
+    """
+
+    run: Run
+    rows: Rows
+    position: Array
+    rotation: Array
+    base: Array
+    slack: Array
+
+    @property
+    def seen(self) -> Array:
+        """What the tracker read (3, N), mm."""
+        return self.rows.position
+
+    @cached_property
+    def limit(self) -> int:
+        """How many readings a hypothesis must explain beyond the record as it stands."""
+        return max(FEW, int(np.ceil(PART * self.rows.count)))
+
+    @cached_property
+    def majority(self) -> tuple[Frame, BoolArray]:
+        """Frame that most readings share, and which (N,) stand where they should in it."""
+        rotation, position, inside = robust_align(self.base, self.seen, self.slack)
+        return (rotation, position), inside
+
+    @cached_property
+    def from_base(self) -> Frame | None:
+        """Frame of the nests on the base alone, where they fit one another."""
+        fixed = ~self.rows.on_platform
+        if collinear(self.base[:, fixed]):
+            return None
+        frame = align(self.base[:, fixed], self.seen[:, fixed])
+        apart = misfit(self.base[:, fixed], self.seen[:, fixed], *frame)
+        return frame if np.all(apart < self.slack[fixed]) else None
+
+    def inside(self, frame: Frame, base: Array | None = None) -> BoolArray:
+        """Which readings (N,) stand within their slack of ``base`` (3, N)."""
+        where = self.base if base is None else base
+        return np.asarray(misfit(where, self.seen, *frame) < self.slack)
+
+    def at(self, nests: Array) -> Array:
+        """Places (3, N) in the base frame of platform nests (3, N)."""
+        return self.position + rotate(self.rotation, nests)
+
+    def with_nests(self, nests: Array) -> Array:
+        """Places (3, N) of all readings if the labelled nests were ``nests`` (3, N)."""
+        return np.where(self.rows.on_platform, self.at(nests), nests)
+
+    def in_nest_frame(self, frame: Frame) -> Array:
+        """Readings (3, N) brought back: platform frame where on the platform, else base frame."""
+        rotation, position = frame
+        base = rotation.T @ (self.seen - position[:, None])
+        own = np.einsum("jin,jn->in", self.rotation, base - self.position)
+        return np.where(self.rows.on_platform, own, base)
+
+
+def places_of(machine: Machine, run: Run) -> Places | None:
+    """Stand a run beside the nominal machine; None where that cannot be done at all."""
+    if not run.measured.any():
+        return None
+    try:
+        rows = stack(machine, [run])
+        model = Model(rows)
+        base = model.base_points()
+        _, linear = aligned(model, base, np.ones(rows.count, dtype=bool))
+    except BadInput:
+        return None  # the fit says it, with the place
+    slack = slack_of(model, linear)
+    slack = slack + disagreement(model, base, np.arange(rows.count), slack)
+    poses, (_, state) = model.nominal_configuration.poses, model.states
+    return Places(run, rows, poses.position[:, state], poses.rotation[:, :, state], base, slack)

@@ -1,0 +1,179 @@
+"""Readings that are no measurement: exactly zero, or the reading before them once more.
+
+A tracker that is measuring never reads the same point twice to its last digit while the SMR stands
+elsewhere; a file that holds a row twice holds one reading.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from calib.arrays import Array, BoolArray, IntArray
+from calib.runs.record import Run
+from calib.runs.remark import Remark, lines_in_words, ranges
+
+DECIMALS = 9
+"""Digits behind the point, mm, that are looked for."""
+BY_CHANCE = 1e-4
+"""Probability that rows agree to the last digit, from which on that is no chance."""
+ONE_AXIS = 5
+"""Successive readings that must agree along one axis alone."""
+
+
+def no_measurements(run: Run) -> tuple[Run, list[Remark]]:
+    """Set aside readings of exactly zero, rows that stand twice, and readings that are stale."""
+    remarks = []
+    for look in (_zeros, _twice, _stale, _stale_axes):
+        which, remark = look(run)
+        if remark is not None:
+            run = replace(run, measured=run.measured & ~which)
+            remarks.append(remark)
+    return run, remarks
+
+
+def _zeros(run: Run) -> tuple[BoolArray, Remark | None]:
+    which = run.measured & np.all(run.position == 0.0, axis=0)
+    if not which.any():
+        return which, None
+    lines = ranges(run.line[which])
+    return which, Remark(
+        "zero-readings",
+        f"{_count(which)} exactly 0, 0, 0: no measurement",
+        lines,
+        "A tracker that stands in the room reads no SMR at its own origin",
+        f"Set aside ({lines_in_words(lines)})",
+        "Remove these rows' x..sz, or measure these poses again",
+        True,
+        run.source,
+    )
+
+
+def _twice(run: Run) -> tuple[BoolArray, Remark | None]:
+    """Rows that repeat the row before in every digit at the same place."""
+    before, same = _pairs(run)
+    which = np.zeros(run.line.size, dtype=bool)
+    for row, last in enumerate(before):
+        if last >= 0 and same[row] and _one_stop(run, row, int(last)):
+            which[row] = np.array_equal(run.position[:, row], run.position[:, last])
+    if not which.any() or _agreement(run, int(which.sum())) > BY_CHANCE:
+        return which, None
+    lines = ranges(run.line[which], run.line[run.measured])
+    return which, Remark(
+        "rows-twice",
+        f"{_count(which)} the row before once more",
+        lines,
+        "Nest, actuators and all digits of x, y, z are those of the row before",
+        f"Counted once ({lines_in_words(lines)} set aside)",
+        "Write every reading once",
+        True,
+        run.source,
+    )
+
+
+def _stale(run: Run) -> tuple[BoolArray, Remark | None]:
+    """Readings that did not change when the SMR did."""
+    before, _ = _pairs(run)
+    which = np.zeros(run.line.size, dtype=bool)
+    for row, last in enumerate(before):
+        if last < 0 or not np.array_equal(run.position[:, row], run.position[:, last]):
+            continue
+        which[row] = which[last] or not _one_stop(run, row, int(last))
+    which &= _in_a_row(which, before)
+    if not which.any() or _agreement(run, 1) > BY_CHANCE:
+        return which, None
+    lines = ranges(run.line[which], run.line[run.measured])
+    return which, Remark(
+        "stale-readings",
+        f"Readings no longer change from line {lines[0][0]} on: the tracker was not measuring"
+        if lines[-1][1] == run.line[run.measured][-1] and len(lines) == 1
+        else f"{_count(which)} the one before to the last digit: the tracker was not measuring",
+        lines,
+        "The SMR was carried or the machine moved, and x, y, z are the same to the last digit",
+        f"Set aside ({lines_in_words(lines)})",
+        "Measure these poses again, and see why the tracker sent its last reading",
+        True,
+        run.source,
+    )
+
+
+def _in_a_row(which: BoolArray, before: IntArray) -> BoolArray:
+    """Those among rows that follow one another: a single repeat is a matter of its own place."""
+    many = np.zeros_like(which)
+    for row in np.flatnonzero(which):
+        if before[row] >= 0 and which[before[row]]:
+            many[[row, before[row]]] = True
+    return many
+
+
+def _stale_axes(run: Run) -> tuple[BoolArray, Remark | None]:
+    """One column of x, y, z that stands still while the others go on."""
+    before, _ = _pairs(run)
+    which = np.zeros(run.line.size, dtype=bool)
+    stuck: list[str] = []
+    for axis, name in enumerate("xyz"):
+        still = np.zeros(run.line.size, dtype=np.intp)
+        for row, last in enumerate(before):
+            alike = last >= 0 and run.position[axis, row] == run.position[axis, last]
+            if alike and not _one_stop(run, row, int(last)):
+                still[row] = still[last] + 1
+        own = np.zeros_like(which)
+        for end in np.flatnonzero(still >= ONE_AXIS - 1):
+            row = int(end)
+            while still[row] > 0:
+                own[row] = True
+                row = int(before[row])
+        if own.any():
+            stuck.append(name)
+            which |= own
+    if not stuck:
+        return which, None
+    lines = ranges(run.line[which], run.line[run.measured])
+    named = " and ".join(stuck)
+    return which, Remark(
+        "stale-column",
+        f"Column {named} stands still in {lines_in_words(lines)} while the SMR moves",
+        lines,
+        f"{named} repeats to the last digit, the other axes do not",
+        "Set aside",
+        "Measure these poses again, and see how the readings were written",
+        True,
+        run.source,
+    )
+
+
+def _pairs(run: Run) -> tuple[IntArray, BoolArray]:
+    """Index of the reading before each reading (-1: none), and whether its nest is the same."""
+    before = np.full(run.line.size, -1, dtype=np.intp)
+    rows = np.flatnonzero(run.measured)
+    before[rows[1:]] = rows[:-1]
+    same = np.array(
+        [last >= 0 and run.nest[row] == run.nest[last] for row, last in enumerate(before)]
+    )
+    return before, same
+
+
+def _one_stop(run: Run, row: int, last: int) -> bool:
+    """Whether two readings are of one nest at one stop of the machine."""
+    return run.nest[row] == run.nest[last] and np.array_equal(run.q[:, row], run.q[:, last])
+
+
+def _agreement(run: Run, pairs: int) -> float:
+    """Probability that two readings of one point agree to the last digit, for so many pairs."""
+    position = run.position[:, run.measured]
+    variances = np.einsum("iin->in", run.covariance[:, :, run.measured])
+    sigma = np.sqrt(np.median(variances, axis=1))
+    step = 10.0 ** -_decimals(position)
+    return float(pairs * np.prod(np.minimum(1.0, step / (2.0 * np.sqrt(np.pi) * sigma))))
+
+
+def _decimals(values: Array) -> int:
+    """Digits behind the point with which the numbers were written."""
+    for digits in range(DECIMALS):
+        if np.allclose(values, np.round(values, digits), rtol=0.0, atol=1e-11):
+            return digits
+    return DECIMALS
+
+
+def _count(which: BoolArray) -> str:
+    count = int(which.sum())
+    return "One reading is" if count == 1 else f"{count} readings are"

@@ -1,0 +1,66 @@
+"""Commanded coordinates against the travel: their unit, sign, reference and order."""
+
+import numpy as np
+
+from calib.arrays import Array
+from calib.errors import BadInput
+from calib.mechanism.description import Machine
+from calib.runs.record import Run
+
+OUTSIDE = 0.5
+"""Part of the rows outside the travel from which on the columns are not what they should be."""
+WIDER = 0.1
+"""Part of the travel by which commands may pass a limit of the file."""
+_LENGTHS = ((1000.0, "m"), (25.4, "inches"), (0.001, "um"), (10.0, "cm"))
+_ANGLES = ((np.pi / 180.0, "degrees"), (0.001, "mrad"), (2.0 * np.pi, "turns"))
+
+
+def check_travel(machine: Machine, run: Run) -> None:
+    """Refuse coordinates that are nowhere near the travel; raises BadInput naming what they are."""
+    inside = _inside(machine, run.q)
+    if inside.mean() >= 1.0 - OUTSIDE:
+        return
+    explained = _explained(machine, run.q)
+    if not explained:
+        return
+    row = int(np.argmin(inside))
+    first = machine.actuators[0]
+    raise BadInput(
+        f"q1..q{len(machine.actuators)} are outside the travel of the actuators "
+        f"({first.name}: {first.limits[0]:.4g} to {first.limits[1]:.4g} {first.unit}, here "
+        f"{run.q[0, row]:.6g}); they look like {explained}",
+        place=f"{run.source}, line {run.line[row]}",
+        remedy=f"Write what the machine file calls q: {first.unit}, counted so that home is "
+        f"{first.home:.6g}",
+    )
+
+
+def _inside(machine: Machine, q: Array) -> Array:
+    low, high = machine.q_limits.T[:, :, None]
+    margin = WIDER * (high - low)
+    return np.asarray(np.all((q >= low - margin) & (q <= high + margin), axis=0))
+
+
+def _explained(machine: Machine, q: Array) -> str:
+    """The first reading of the numbers that brings almost all of them into the travel."""
+    units = [actuator.unit for actuator in machine.actuators]
+    home = machine.home_q[:, None]
+    tried: list[tuple[Array, str]] = []
+    for factors, of in ((_LENGTHS, "mm"), (_ANGLES, "rad")):
+        if of not in units:
+            continue
+        for factor, name in factors:
+            scale = np.array([factor if unit == of else 1.0 for unit in units])[:, None]
+            tried.append((scale * q, name))
+            tried.append((home + scale * q, f"changes from home in {name}"))
+    tried += [
+        (home + q, "changes from home, not positions"),
+        (-q, "positions of the wrong sign"),
+        (home - q, "changes from home of the wrong sign"),
+    ]
+    for values, name in tried:
+        if _inside(machine, values).mean() >= 0.95 and np.ptp(values) > 0:
+            return name
+    if _inside(machine, q[::-1]).mean() >= 0.95:
+        return "the actuators in reversed order"
+    return ""
