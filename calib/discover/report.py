@@ -159,7 +159,7 @@ def advice(found: RunDiagnosis, record: Sequence[Remark] = (), refused: Sequence
     What is wrong with the record comes before all physics.
     """
     first = [one for one in record if not one.settled]
-    if first:
+    if first and not runs_at_odds(found.fit):
         return f"{first[0].says}. {first[0].remedy}; then ask again."
     return _of_physics(found, refused)
 

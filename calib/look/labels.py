@@ -15,6 +15,7 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray
 from calib.identify.alignment import robust_align
+from calib.identify.starting import MAJORITY
 from calib.look.places import Frame, Places
 from calib.look.proposal import Proposal
 from calib.runs.record import Run
@@ -43,6 +44,8 @@ def _best(places: Places, frames: Iterable[Frame]) -> Proposal | None:
     best: Proposal | None = None
     for frame in frames:
         true, explained = _read_as(places, frame)
+        if not _enough_right(places, true):
+            continue
         count = int(explained.sum())
         if np.any(true != _labels(places)) and (best is None or count > best.explained):
             best = Proposal(count, partial(_relabelled, places, true))
@@ -112,6 +115,18 @@ def _read_as(places: Places, frame: Frame) -> tuple[np.ndarray, BoolArray]:
             true[other], nearest[other] = name, distance[other]
             explained |= other
     return true, explained
+
+
+def _enough_right(places: Places, true: np.ndarray) -> bool:
+    """Whether enough labels are right; where not, the fit refuses the run, with the line.
+
+    An exchange of two is plain even if no other nest was read.
+    """
+    labels = _labels(places)
+    wrong = true != labels
+    pairs = set(zip(labels[wrong], true[wrong], strict=True))
+    exchange = len(pairs) == 2 and {(b, a) for a, b in pairs} == pairs
+    return exchange or bool(np.mean(~wrong) >= MAJORITY)
 
 
 def _relabelled(places: Places, true: np.ndarray) -> tuple[Run, Remark]:

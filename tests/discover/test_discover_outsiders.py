@@ -61,8 +61,10 @@ def test_discover_outsiders_moved_tracker_is_told(capsys, changed):
         return rows
 
     found = answer(capsys, "diagnose", changed(move))
-    assert "moved as one" in found["bad_readings"][0]["why"]
-    assert "a run of its own" in found["advice"]
+    assert [one["name"] for one in found["record"]] == ["station-moved"]
+    assert found["baseline"]["effects"] == ["frame-shift"]
+    assert found["bad_readings"] == []
+    assert found["adequate"]
 
 
 @pytest.mark.parametrize(("sigma", "said"), [("0.0005", "10 times"), ("0.05", "only 0.1")])
