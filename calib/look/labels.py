@@ -64,6 +64,8 @@ def mirrored_table(places: Places) -> Proposal | None:
         base = places.with_nests(nests)
         _, _, inside = robust_align(base, places.seen, places.slack)
         count = int(inside.sum())
+        if count < places.rows.count - places.limit:
+            continue  # half of a mirror image is some other mistake
         if best is None or count > best.explained:
             best = Proposal(count, partial(_mirrored, places, axis))
     return best
