@@ -15,6 +15,8 @@ from calib.runs.remark import Remark, lines_in_words, ranges
 
 LEAST = 4
 """Readings of a nest that must be off alike."""
+MOST_MM = 25.0
+"""Offset, mm, beyond which it is no seat."""
 ALONG = 0.95
 """Part of an offset along the normal of the nests from which on it is the SMR's size."""
 RADII = {"1.5 inch": 19.05, "7/8 inch": 11.1125, "0.5 inch": 6.35, "30 mm": 15.0, "20 mm": 10.0}
@@ -41,6 +43,8 @@ def displaced_seat(places: Places) -> Proposal | None:
         if which.sum() < LEAST:
             continue
         middle = np.median(back[:, which], axis=1)
+        if np.linalg.norm(middle) > MOST_MM:
+            continue
         fits = which & (np.linalg.norm(back - middle[:, None], axis=0) < places.slack)
         explained = int(inside.sum() + (own & ~off & ~which).sum() + fits.sum())
         if fits.sum() >= 0.9 * which.sum() and (best is None or explained > best.explained):
