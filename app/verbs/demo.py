@@ -43,19 +43,35 @@ HEAD = ("216 poses", "peak um", "std um", "peak deg", "std deg")
     type=click.Path(path_type=Path),
     help="Folder to make.  [default: out/demo-<date and time>]",
 )
+@click.option(
+    "--bare",
+    "device",
+    flag_value="--bare",
+    help="Drives alone, without a controller: the host computes the legs.",
+)
+@click.option(
+    "--pose",
+    "device",
+    flag_value="--pose",
+    help="A closed controller that takes poses: the host corrects them.",
+)
 @answer.json_option
-def command(seed: int, count: int, scale: float, out: Path | None, as_json: bool) -> None:
+def command(
+    seed: int, count: int, scale: float, out: Path | None, device: str | None, as_json: bool
+) -> None:
     """Calibrate a mock hexapod without a person, and write a report.
 
     Verifies 216 poses, measures the chosen ones with a laser tracker over TCP, identifies 54
-    parameters, writes them to the motion controller over CAN, and verifies again.
+    parameters, writes them to the motion controller over CAN, and verifies again. With --bare or
+    --pose the parameters stay here, in a host store, and every command is computed with them.
     """
     folder = out or Path("out") / f"demo-{datetime.now():%Y%m%d-%H%M%S}"
     folder.mkdir(parents=True, exist_ok=True)
     folder = folder.resolve()
     screen = DemoScreen(Console(stderr=True, highlight=False, quiet=as_json))
     began = time.monotonic()
-    with screen.shown(), mock_station("hexapod", seed, scale, folder) as site_file:
+    more = [device] if device else []
+    with screen.shown(), mock_station("hexapod", seed, scale, folder, more) as site_file:
         outcome = asyncio.run(_run(Demo(folder, count, seed, screen.watcher), site_file))
     rows = result_lines(outcome)
     answer.show(
