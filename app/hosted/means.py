@@ -13,7 +13,7 @@ import numpy as np
 from calib.arrays import Array
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import Poses, pose_difference
-from calib.mechanism.solve import forward, inverse
+from calib.mechanism.solve import Configuration, forward, inverse
 from drivers.errors import ProtocolError, Refused
 from drivers.interface import ActuatorState, ControllerState, Motors, Moving, PoseMover
 
@@ -73,6 +73,9 @@ class ByPoses:
     def __init__(self, mover: PoseMover, machine: Machine) -> None:
         self.device = mover
         self._machine = machine
+        self._near: Configuration | None = None
+        self._told: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+        """Pose that the controller is bound for, and its coordinates."""
 
     async def send(self, extension: Array) -> tuple[float, ...]:
         """Start moving to the pose that the drawn machine has at these extensions.
@@ -94,7 +97,8 @@ class ByPoses:
                 device=self.device.identity.kind,
                 remedy="Check units, rotation order and coordinate system in the site file",
             )
-        return self._coordinates(told)
+        self._told = (told, self._coordinates([told])[0])
+        return self._told[1]
 
     async def state(self) -> ControllerState:
         """The actuators as it tells them, or as the drawn machine has them at its poses.
@@ -105,8 +109,9 @@ class ByPoses:
         axes = said.actuators
         if [axis.name for axis in axes] == [one.name for one in self._machine.actuators]:
             return said
-        at = self._coordinates(tuple(axis.position for axis in axes))
-        to = self._coordinates(tuple(axis.target for axis in axes))
+        at, to = self._at_and_to(
+            tuple(axis.position for axis in axes), tuple(axis.target for axis in axes)
+        )
         fault = next((axis.fault for axis in axes if axis.fault), "")
         shared = ActuatorState(
             "", 0.0, 0.0, axes[0].state, any(axis.moving for axis in axes),
@@ -130,11 +135,26 @@ class ByPoses:
         """Pivot, coordinate system and rotation order, as it says them."""
         return await self.device.frame()
 
-    def _coordinates(self, pose: tuple[float, ...]) -> tuple[float, ...]:
-        """Actuator coordinates (n,) of the drawn machine at a pose; nan where it does not close."""
-        closed = inverse(self._machine, Poses.from_xyz_rpy(np.array(pose)[:, None]))
-        q = self._machine.coordinates(closed.extension)[:, 0]
-        return tuple(float(v) if closed.converged[0] else np.nan for v in q)
+    def _at_and_to(
+        self, at: tuple[float, ...], to: tuple[float, ...]
+    ) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Coordinates where it is, and where it is bound for: that changes with every command."""
+        if to == self._told[0]:
+            return self._coordinates([at])[0], self._told[1]
+        here, there = self._coordinates([at, to])
+        self._told = (to, there)
+        return here, there
+
+    def _coordinates(self, poses: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+        """Actuator coordinates (n,) of the drawn machine at poses; nan where it does not close."""
+        wanted = Poses.from_xyz_rpy(np.array(poses).T)
+        closed = inverse(self._machine, wanted, start=self._near)
+        if self._near is not None and not closed.converged.all():
+            closed = inverse(self._machine, wanted)
+        if closed.converged[0]:
+            self._near = closed.take(slice(0, 1))
+        q = np.where(closed.converged, self._machine.coordinates(closed.extension), np.nan)
+        return [tuple(map(float, column)) for column in q.T]
 
 
 def _said(pose: tuple[float, ...]) -> str:
