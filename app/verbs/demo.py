@@ -44,12 +44,6 @@ HEAD = ("216 poses", "peak um", "std um", "peak deg", "std deg")
     help="Folder to make.  [default: out/demo-<date and time>]",
 )
 @click.option(
-    "--bare",
-    "device",
-    flag_value="--bare",
-    help="Drives alone, without a controller: the host computes the legs.",
-)
-@click.option(
     "--pose",
     "device",
     flag_value="--pose",
@@ -62,7 +56,7 @@ def command(
     """Calibrate a mock hexapod without a person, and write a report.
 
     Verifies 216 poses, measures the chosen ones with a laser tracker over TCP, identifies 54
-    parameters, writes them to the motion controller over CAN, and verifies again. With --bare or
+    parameters, writes them to the motion controller over CAN, and verifies again. With
     --pose the parameters stay here, in a host store, and every command is computed with them.
     """
     folder = out or Path("out") / f"demo-{datetime.now():%Y%m%d-%H%M%S}"

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Lab, lab
+from hosted_lab import Lab, lab
 
 from app.files.fits import SavedFit, read_fit
 from app.files.machines import load_machine
