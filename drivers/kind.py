@@ -20,12 +20,15 @@ from drivers.interface import MotionController, Motors, PoseMover, Tracker
 CONTROLLERS: Final = "pkmcal.controllers"
 TRACKERS: Final = "pkmcal.trackers"
 
-Form = Literal["text", "whole", "number", "numbers", "flag", "words", "address", "file", "table"]
+Form = Literal[
+    "text", "whole", "number", "numbers", "flag", "words", "address", "file", "files", "table"
+]
 """Forms of a setting.
 
 ``text``, ``whole`` (an int), ``number``, ``flag`` (a bool); ``numbers`` (a list of ``count``);
 ``words`` (a text of words apart by spaces, a list of str); ``address`` (``host:port``); ``file``
-(a path, made absolute from the folder of the site file); ``table`` (any keys: what they are is
+(a path, made absolute from the folder of the site file); ``files`` (one path for all of ``count``,
+or a list of so many; a list of str); ``table`` (any keys: what they are is
 another program's business).
 """
 

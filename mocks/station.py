@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from mocks.canopen.bare_site import bare_site
 from mocks.canopen.server import CanopenStation
 from mocks.clock import ScaledClock
 from mocks.control import ControlServer, Hands
@@ -64,6 +65,7 @@ class MockStation:
         serial: int | None = None,
         lines: bool = False,
         pose: bool = False,
+        bare: bool = False,
     ) -> None:
         self.world = world
         self.clock = clock
@@ -73,7 +75,7 @@ class MockStation:
         self.controller: CanopenStation | GcsStation = (
             GcsStation(world, nvm, host, ports[0], True, self.serial, pose)
             if pose or world.machine.name in ON_GCS
-            else CanopenStation(world, nvm, host, ports[0], self.serial)
+            else CanopenStation(world, nvm, host, ports[0], self.serial, bare)
         )
         self.tracker = TrackerServer(world, clock, host, ports[1])
         self.lines = LineServer(world, clock, host) if lines else None
@@ -126,6 +128,8 @@ class MockStation:
             return {"kind": "pose", "port": port, **POSE_SITE} if self.pose else {
                 "kind": "gcs", "port": port,
             }  # fmt: skip
+        if self.controller.controller is None:
+            return bare_site(self.world, self.channel, self.controller.serials)
         return {
             "kind": "canopen", "interface": "slcan", "channel": self.channel,
             "node": CONTROLLER_NODE,
@@ -147,7 +151,7 @@ class MockStation:
         return {
             "title": f"mock {self.world.machine.name}, seed {plan.seed}",
             "machine": self.world.machine.name,
-            "controller": {**self._controller_site(), "serial": str(self.serial)},
+            "controller": {"serial": str(self.serial), **self._controller_site()},
             "tracker": {**self._tracker_site(), "frame": self._rough_frame()},
             "nests": {
                 "platform": {k: list(v) for k, v in around.platform_nests.items()},
@@ -214,6 +218,10 @@ def parser() -> argparse.ArgumentParser:
         "--pose", action="store_true",
         help="hexapod: a closed controller that takes poses over GCS and shows no parameters",
     )  # fmt: skip
+    parser.add_argument(
+        "--bare", action="store_true",
+        help="CiA 402 drives alone, without a controller (kind drives)",
+    )  # fmt: skip
     parser.add_argument("--payload", type=float, default=0.0, help="kg")
     for name in ("controller", "tracker", "control"):
         parser.add_argument(f"--{name}-port", type=int, default=0)
@@ -245,8 +253,10 @@ def build(options: argparse.Namespace) -> MockStation:
     ports = (options.controller_port, options.tracker_port, options.control_port)
     if options.pose and options.machine != "hexapod":
         raise ValueError(f"there is no closed controller (--pose) of the {options.machine}")
+    if options.bare and (options.pose or options.machine in ON_GCS):
+        raise ValueError(f"there are no drives alone (--bare) of the {options.machine} on GCS")
     return MockStation(
-        world, clock, options.nvm, ports, options.serial, options.lines, options.pose
+        world, clock, options.nvm, ports, options.serial, options.lines, options.pose, options.bare
     )
 
 

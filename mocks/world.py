@@ -77,6 +77,11 @@ class World:
         return self.machine.name
 
     @property
+    def unit(self) -> str:
+        """Unit of the actuators."""
+        return self.machine.actuators[0].unit
+
+    @property
     def stroke(self) -> Stroke:
         """How large a move is, in the actuators' unit."""
         return self.body.stroke

@@ -64,6 +64,8 @@ def _read(table: TomlTable, setting: Setting, actuators: int, folder: Path) -> A
             return ":".join(map(str, read_address(table, name, setting.port)))
         case "file":
             return str((folder / table.text(name)).resolve())
+        case "files":
+            return [str((folder / path).resolve()) for path in _paths(table, name, count)]
         case "table":
             return _plain(table, name)
 
@@ -88,6 +90,7 @@ FORM_WORDS = {
     "words": "words in one text",
     "address": "host:port",
     "file": "path",
+    "files": "path, or list of paths",
     "table": "any keys",
 }
 
@@ -99,6 +102,20 @@ def _words(table: TomlTable, name: str, count: int | None) -> list[str]:
             f"{name} has {len(words)} words, {count} are wanted", name, remedy=f"Write {count}"
         )
     return words
+
+
+def _paths(table: TomlTable, name: str, count: int | None) -> list[str]:
+    """One path for all, or one for each."""
+    if not isinstance(table.raw(name), list):
+        return [table.text(name)]
+    paths = table.texts(name)
+    if count is not None and len(paths) not in (1, count):
+        raise table.wrong(
+            f"{name} has {len(paths)} paths, 1 or {count} are wanted",
+            name,
+            remedy=f"Write one path for all, or {count}",
+        )
+    return paths
 
 
 def _plain(table: TomlTable, name: str) -> dict[str, Any]:

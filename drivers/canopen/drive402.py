@@ -107,14 +107,23 @@ class Drive402:
 
     async def read(self, index: int, sub: int = 0) -> int:
         """Read an integer object."""
-        return await self.remote.call(lambda: self._read(index, sub))
+        return await self.remote.call(lambda: self.read_now(index, sub))
 
     async def write(self, index: int, value: int, sub: int = 0) -> None:
         """Write an integer object."""
         await self.remote.call(lambda: self._write(index, value, sub))
 
-    def _read(self, index: int, sub: int = 0) -> int:
+    def read_now(self, index: int, sub: int = 0) -> int:
+        """Read an integer object; blocking, within :meth:`Device.call`."""
         return int(self._variable(index, sub).decode_raw(self.remote.upload(index, sub)))
+
+    def tell(self, index: int, value: int, sub: int = 0) -> None:
+        """Keep a value that was sent by PDO, for the frames that repeat it."""
+        self._told[index, sub] = self._variable(index, sub).encode_raw(value)
+
+    def has(self, index: int, sub: int = 0) -> bool:
+        """Whether the EDS file has an object."""
+        return self.remote.node.object_dictionary.get_variable(index, sub) is not None
 
     def _write(self, index: int, value: int, sub: int = 0) -> None:
         if index == CONTROLWORD and value & ENABLE == ENABLE and self.stopped:
@@ -241,8 +250,8 @@ class Drive402:
 
     # ------------------------------------------------------------ single motion
 
-    async def home(self, timeout: float, back_to: int = CYCLIC_POSITION) -> None:
-        """Run the homing procedure of 0x6098, wait for its end, and go to mode ``back_to``.
+    async def home(self, timeout: float, back_to: int | None = CYCLIC_POSITION) -> None:
+        """Run the homing procedure of 0x6098, wait for its end, and go to mode ``back_to``, if any.
 
         Raises DriveFault, Refused (stopped meanwhile), Silence.
         """
@@ -262,7 +271,8 @@ class Drive402:
 
         await self.wait(attained, timeout, "find its reference")
         await self.write(CONTROLWORD, ENABLE)
-        await self.set_mode(back_to)
+        if back_to is not None:
+            await self.set_mode(back_to)
 
     async def _homing_begun(self) -> None:
         """Wait until bits 10 and 12 are those of this homing, not of an earlier one.
@@ -277,8 +287,9 @@ class Drive402:
             if not (status & ACKNOWLEDGED and status & REACHED):
                 return
             await asyncio.sleep(POLL_S)
-        off = abs(await self.read(ACTUAL_POSITION) - await self.read(HOME_OFFSET))
-        if off > await self.read(POSITION_WINDOW):
+        home = await self.read(HOME_OFFSET) if self.has(HOME_OFFSET) else 0
+        window = await self.read(POSITION_WINDOW) if self.has(POSITION_WINDOW) else 0
+        if abs(await self.read(ACTUAL_POSITION) - home) > window:
             raise DriveFault(
                 "did not begin to look for its reference: it reports that of an earlier homing",
                 device=self.device,

@@ -29,7 +29,8 @@ async def _open(around: Surroundings) -> MotionController:
     )
 
 
-def _known_interface(name: str) -> str:
+def known_interface(name: str) -> str:
+    """What is wrong with the name of an interface; empty if python-can has it."""
     import can
 
     known = sorted(can.VALID_INTERFACES)
@@ -46,7 +47,7 @@ KIND: Kind[MotionController] = Kind(
     says="A kinematic controller with its CiA 402 drives on CANopen, our object dictionary",
     settings=(
         Setting(
-            "interface", "text", "any interface of python-can", "slcan", check=_known_interface
+            "interface", "text", "any interface of python-can", "slcan", check=known_interface
         ),
         Setting("channel", "text", 'as the interface calls it: "can0", "socket://host:port", ...'),
         Setting("bitrate", "whole", "of the bus, bit/s; 0 where the adapter knows it", 0),

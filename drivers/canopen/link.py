@@ -161,12 +161,16 @@ class CanLink:
         connection = getattr(port, "_socket", None)
         return connection if isinstance(connection, socket.socket) else None
 
-    def add_device(self, node_id: int, eds: Path, label: str) -> "Device":
-        """Add a remote node; ``label`` is what errors call it."""
+    def add_device(self, node_id: int, eds: Path, label: str, pdos: bool = True) -> "Device":
+        """Add a remote node; ``label`` is what errors call it.
+
+        ``pdos``: whether its PDOs are as its EDS file says.
+        """
         node = self._network.add_node(node_id, dictionary(eds, node_id))
         node.sdo.RESPONSE_TIMEOUT = SDO_DEADLINE_S
-        node.tpdo.read(from_od=True)
-        node.rpdo.read(from_od=True)
+        if pdos:
+            node.tpdo.read(from_od=True)
+            node.rpdo.read(from_od=True)
         self._locks[node_id] = threading.Lock()
         self._labels[node_id] = label
         node.nmt.add_heartbeat_callback(lambda state: self._hear(node_id, state))
@@ -229,9 +233,10 @@ class CanLink:
     async def send(self, frames: list[tuple[int, bytes]]) -> None:
         """Send frames (COB-ID, data) in this order; raises LinkLost."""
         self._must_be_open()
-        await self._loop.run_in_executor(self._workers, self._send_all, frames)
+        await self._loop.run_in_executor(self._workers, self.send_now, frames)
 
-    def _send_all(self, frames: list[tuple[int, bytes]]) -> None:
+    def send_now(self, frames: list[tuple[int, bytes]]) -> None:
+        """As :meth:`send`, from any thread; blocking."""
         try:
             for cob_id, data in frames:
                 self._network.send_message(cob_id, data)

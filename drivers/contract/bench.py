@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from drivers.errors import DeviceError
-from drivers.interface import MotionController, PoseMover, Tracker
+from drivers.interface import MotionController, Motors, PoseMover, Tracker
 from drivers.kind import ActuatorFacts
 
 POSE_AXES = (("x", "mm"), ("y", "mm"), ("z", "mm"), ("rx", "rad"), ("ry", "rad"), ("rz", "rad"))
@@ -133,7 +133,54 @@ class PoseBench:
         await device.move_pose((math.nan, *self.poses[0][1:]))
 
 
-BenchT = TypeVar("BenchT", TrackerBench, ControllerBench, PoseBench)
+@dataclass(frozen=True)
+class MotorsBench:
+    """Drives that take actuator values, whose machine may move.
+
+    Attributes
+    ----------
+    open, longest_s, actuators, silence, settle_s
+        As of :class:`ControllerBench`; the move between the places should last a second or more.
+    places : two tuples
+        Two values of q, the first near home; the actuators' ways between them all differ.
+    unreachable : tuple
+        A value of q of which one actuator's is outside its limits.
+    stall : coroutine function
+        Block the last actuator in its way; None where that cannot be done.
+    """
+
+    open: Callable[[], Awaitable[Motors]]
+    longest_s: float
+    actuators: tuple[ActuatorFacts, ...]
+    places: tuple[tuple[float, ...], tuple[float, ...]]
+    unreachable: tuple[float, ...]
+    silence: Act | None = None
+    stall: Act | None = None
+    settle_s: float = 1.0
+
+    @property
+    def axes(self) -> tuple[tuple[str, str], ...]:
+        """Names and units of its actuators."""
+        return tuple((actuator.name, actuator.unit) for actuator in self.actuators)
+
+    async def connect(self) -> Motors:
+        """A new driver."""
+        return await self.open()
+
+    async def start(self, device: Motors, which: int) -> None:
+        """Start moving to one of the two places."""
+        await device.move_actuators(self.places[which])
+
+    async def start_out_of_reach(self, device: Motors) -> None:
+        """Ask for the place that it must refuse."""
+        await device.move_actuators(self.unreachable)
+
+    async def start_nan(self, device: Motors) -> None:
+        """Ask for what is no place."""
+        await device.move_actuators((math.nan, *self.places[0][1:]))
+
+
+BenchT = TypeVar("BenchT", TrackerBench, ControllerBench, MotorsBench, PoseBench)
 
 
 @dataclass(frozen=True)

@@ -54,14 +54,26 @@ class Drive(StationNode):
             (0x603F, 0): lambda: self.fault_code,
             (0x6041, 0): self.statusword,
             (0x6061, 0): lambda: self.mode,
-            (0x6062, 0): lambda: round(self.leg.target * self.counts),
-            (0x6064, 0): lambda: round(self.leg.position() * self.counts),
+            (0x6062, 0): lambda: self.counts_at(self.leg.target),
+            (0x6064, 0): lambda: self.counts_at(self.leg.position()),
         }
         self.writers |= {
             (0x6040, 0): self._on_controlword,
             (0x6060, 0): self._on_mode,
             (0x6098, 0): _check_homing_method,
         }
+
+    def counts_at(self, extension: float) -> int:
+        """What the drive counts at an extension (mm or rad)."""
+        return round(extension * self.counts)
+
+    def extension_at(self, counts: int) -> float:
+        """Extension at which it counts so many."""
+        return counts / self.counts
+
+    def homing_target(self) -> int:
+        """What it counts at its reference before it takes it."""
+        return int(self.value(0x607C))
 
     # ------------------------------------------------------------ what the controller asks
 
@@ -78,12 +90,12 @@ class Drive(StationNode):
     @property
     def settled(self) -> bool:
         """Whether the leg rests inside the position window of its target."""
-        window = self.value(0x6067) / self.counts
+        window = self.value(0x6067) / abs(self.counts)
         return not self.leg.moving and abs(self.leg.position() - self.leg.target) <= window
 
     def allows(self, extension: float) -> bool:
         """Whether an extension (mm or rad) is within the software limits 0x607D."""
-        counts = extension * self.counts
+        counts = self.counts_at(extension)
         return bool(self.value(0x607D, 1) <= counts <= self.value(0x607D, 2))
 
     def follow(self, extension: float, duration_s: float) -> None:
@@ -142,7 +154,7 @@ class Drive(StationNode):
     def _take_setpoint(self, word: int) -> None:
         target = self.value(0x607A)
         if word & RELATIVE:
-            target += round(self.leg.target * self.counts)
+            target += self.counts_at(self.leg.target)
         self.mode_bit = True
         if self.leg.moving and not word & IMMEDIATELY:
             self._waiting = target
@@ -159,13 +171,13 @@ class Drive(StationNode):
     def _start_homing(self) -> None:
         self._homing, self.mode_bit, self._reached = True, False, False
         self.referenced = False
-        self._move(self.value(0x607C), self.value(0x6099, 1), self.value(0x609A))
+        self._move(self.homing_target(), self.value(0x6099, 1), self.value(0x609A))
 
     def _move(self, target: int, speed: int, acceleration: int) -> None:
-        way = abs(target - self.leg.position() * self.counts)
+        way = abs(target - self.counts_at(self.leg.position()))
         slow = PEAK_SPEED * way / max(speed, 1)
         soft = math.sqrt(PEAK_ACCELERATION * way / max(acceleration, 1))
-        self.leg.command(target / self.counts, max(slow, soft))
+        self.leg.command(self.extension_at(target), max(slow, soft))
 
     # ------------------------------------------------------------ what happens by itself
 
@@ -174,7 +186,7 @@ class Drive(StationNode):
         if self.machine.faults.take(f"reference-lost:{self.number}"):
             self.referenced = False
         if self.heartbeat_overdue() and self.state is not State.SWITCH_ON_DISABLED:
-            self.fail(EMCY_HEARTBEAT)
+            self.lose_pc()
         if self._injected():
             self.fail(EMCY_HARDWARE)
         if self._follows_badly():
@@ -184,6 +196,14 @@ class Drive(StationNode):
         if not self.leg.moving:
             self._rest()
         self._report()
+
+    def lose_pc(self) -> None:
+        """The PC says nothing more."""
+        self.fail(EMCY_HEARTBEAT)
+
+    def attain(self) -> None:
+        """Homing ends at the reference."""
+        self._homing, self.mode_bit, self.referenced = False, True, True
 
     def _rest(self) -> None:
         if self.state is State.QUICK_STOP_ACTIVE and self.value(0x605A) in (1, 2, 3):
@@ -195,13 +215,13 @@ class Drive(StationNode):
         elif not self._reached and self.settled:
             self._reached = True
             if self._homing:
-                self._homing, self.mode_bit, self.referenced = False, True, True
+                self.attain()
 
     def _injected(self) -> bool:
         return str(self.number) in self.machine.faults.arguments("drive-fault")
 
     def _follows_badly(self) -> bool:
-        error = abs(self.leg.target - self.leg.position()) * self.counts
+        error = abs((self.leg.target - self.leg.position()) * self.counts)
         powered = self.state is State.OPERATION_ENABLED
         if not (powered and self.leg.stalled and error > self.value(0x6065)):
             self._following_since = None

@@ -30,12 +30,16 @@ class Entry:
 
 @dataclass(frozen=True)
 class Object:
-    """One index of the dictionary: a variable (one entry) or an array or record of entries."""
+    """One index of the dictionary: a variable (one entry) or an array or record of entries.
+
+    ``used``: of an array whose number of entries may be written, how many of them count at first.
+    """
 
     index: int
     name: str
     entries: tuple[Entry, ...]
     code: int = VAR
+    used: int | None = None
 
 
 def variable(index: int, entry: Entry) -> Object:
@@ -43,9 +47,9 @@ def variable(index: int, entry: Entry) -> Object:
     return Object(index, entry.name, (entry,), DOMAIN if entry.kind == "DOMAIN" else VAR)
 
 
-def array(index: int, name: str, entries: Sequence[Entry]) -> Object:
+def array(index: int, name: str, entries: Sequence[Entry], used: int | None = None) -> Object:
     """Return an object whose entries all have one type; sub-index 0 counts them."""
-    return Object(index, name, tuple(entries), ARRAY)
+    return Object(index, name, tuple(entries), ARRAY, used)
 
 
 def record(index: int, name: str, entries: Sequence[Entry]) -> Object:
@@ -87,7 +91,10 @@ def _object_lines(obj: Object) -> list[str]:
         f"SubNumber={len(obj.entries) + 1}",
         "",
     ]
-    lines += _section(f"{title}sub0", Entry("Number of entries", "U8", "ro", len(obj.entries)))
+    count = Entry("Number of entries", "U8", "ro", len(obj.entries))
+    if obj.used is not None:
+        count = Entry("Number of entries", "U8", "rw", obj.used)
+    lines += _section(f"{title}sub0", count)
     for sub, entry in enumerate(obj.entries, start=1):
         lines += _section(f"{title}sub{sub:X}", entry)
     return lines

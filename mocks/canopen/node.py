@@ -63,12 +63,16 @@ class StationNode(canopen.LocalNode):
         """Join the bus and listen to NMT, to the mapped PDOs and to every heartbeat."""
         network.add_node(self)
         network.subscribe(0, self._on_nmt)
-        self.rpdo.read(from_od=True)
         self.tpdo.read(from_od=True)
-        for pdo in self.rpdo.values():
-            pdo.add_callback(self._on_rpdo)
+        self.listen_to_pdos()
         for producer in range(1, 128):
             network.subscribe(0x700 + producer, self._on_heartbeat)
+
+    def listen_to_pdos(self) -> None:
+        """Take the RPDOs of the EDS file."""
+        self.rpdo.read(from_od=True)
+        for pdo in self.rpdo.values():
+            pdo.add_callback(self._on_rpdo)
 
     def _on_nmt(self, _can_id: int, data: bytearray, _timestamp: float) -> None:
         command, node_id = data[0], data[1]

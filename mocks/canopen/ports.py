@@ -65,6 +65,10 @@ class Machine(Protocol):
         """Name of the machine file."""
 
     @property
+    def unit(self) -> str:
+        """Unit of the actuators: mm or rad."""
+
+    @property
     def stroke(self) -> Stroke:
         """How large a move is, in the actuators' unit."""
 

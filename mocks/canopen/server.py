@@ -5,14 +5,17 @@ from functools import partial
 from pathlib import Path
 
 from drivers.canopen.eds import drive_eds_path, eds_path
+from mocks.canopen.bare_drive import BareDrive
+from mocks.canopen.bare_eds import bare_eds_path
 from mocks.canopen.bus import EndpointBus, StationNetwork
 from mocks.canopen.controller import Controller
 from mocks.canopen.drive402 import Drive
+from mocks.canopen.node import StationNode
 from mocks.canopen.ports import Machine
 from mocks.canopen.slcan import Frame, SlcanEndpoint
 
 CONTROLLER_NODE = 10
-LONGEST_PAUSE_S, SHORTEST_PAUSE_S = 0.02, 0.0005
+LONGEST_PAUSE_S, BARE_PAUSE_S, SHORTEST_PAUSE_S = 0.02, 0.004, 0.0005
 
 
 class CanopenStation:
@@ -29,6 +32,8 @@ class CanopenStation:
         Where the adapter listens; see :attr:`address`.
     serial : int
         Serial number of the controller (0x1018:4).
+    bare : bool
+        Whether there are drives alone, as their maker sells them, and no controller.
     """
 
     def __init__(
@@ -38,17 +43,23 @@ class CanopenStation:
         host: str = "127.0.0.1",
         port: int = 0,
         serial: int = 1001,
+        bare: bool = False,
     ) -> None:
         self._world = world
         self._bus = EndpointBus(self._silent)
         self.network = StationNetwork(self._bus)
-        drive_eds = drive_eds_path(world.kind)
-        self.drives = [Drive(n, drive_eds, world) for n in range(1, len(world.legs) + 1)]
-        controller_eds = eds_path(f"{world.kind}_controller")
-        self.controller = Controller(CONTROLLER_NODE, controller_eds, world, self.drives, nvm_path)
-        self.controller.readers[0x1018, 4] = lambda: serial
+        numbers = range(1, len(world.legs) + 1)
+        drives: list[Drive] = (
+            [BareDrive(n, bare_eds_path(world.unit), world) for n in numbers]
+            if bare
+            else [Drive(n, drive_eds_path(world.kind), world) for n in numbers]
+        )
+        self.drives = drives
+        self.controller = None if bare else _controller(world, drives, nvm_path, serial)
+        self.nodes: list[StationNode] = [*drives, *([self.controller] if self.controller else [])]
+        self.serials = [10 * serial + number for number in numbers]
         for number, drive in enumerate(self.drives, start=1):
-            drive.readers[0x1018, 4] = partial(int, 10 * serial + number)
+            drive.readers[0x1018, 4] = partial(int, self.serials[number - 1])
         self.endpoint = SlcanEndpoint(self._receive, host, port)
         self._bus.endpoint = self.endpoint
         self._wake = threading.Event()
@@ -63,7 +74,7 @@ class CanopenStation:
     def start(self) -> None:
         """Power on: nodes boot, the adapter accepts clients."""
         with self.network.lock:
-            for node in (*self.drives, self.controller):
+            for node in self.nodes:
                 node.attach(self.network)
             self._power_on()
         self._world.faults.subscribe(self._on_fault)
@@ -76,7 +87,7 @@ class CanopenStation:
         self._wake.set()
         self._thread.join(2.0)
         self.endpoint.stop()
-        for node in (*self.drives, self.controller):
+        for node in self.nodes:
             node.nmt.stop_heartbeat()
         self._bus.shutdown()
 
@@ -92,7 +103,8 @@ class CanopenStation:
     def _power_on(self) -> None:
         for drive in self.drives:
             drive.power_on()
-        self.controller.power_on()
+        if self.controller is not None:
+            self.controller.power_on()
 
     def _silent(self, node_id: int) -> bool:
         return str(node_id) in self._world.faults.arguments("heartbeat-silent")
@@ -102,8 +114,14 @@ class CanopenStation:
 
     def _receive(self, frame: Frame) -> None:
         self.network.receive(frame)
-        if self.controller.wall_time_left < LONGEST_PAUSE_S:
+        if self._wall_time_left() < LONGEST_PAUSE_S:
             self._wake.set()
+
+    def _wall_time_left(self) -> float:
+        """Wall seconds after which it is worth while to look again."""
+        if self.controller is not None:
+            return self.controller.wall_time_left
+        return BARE_PAUSE_S if any(leg.moving for leg in self._world.legs) else LONGEST_PAUSE_S
 
     def _run(self) -> None:
         while not self._stopping:
@@ -113,7 +131,17 @@ class CanopenStation:
                     self._world.faults.take("power-cycle")  # only now: the power is back
                 for drive in self.drives:
                     drive.tick()
-                self.controller.tick()
-                left = self.controller.wall_time_left
+                if self.controller is not None:
+                    self.controller.tick()
+                left = self._wall_time_left()
             self._wake.wait(min(max(left, SHORTEST_PAUSE_S), LONGEST_PAUSE_S))
             self._wake.clear()
+
+
+def _controller(
+    world: Machine, drives: list[Drive], nvm_path: Path | None, serial: int
+) -> Controller:
+    eds = eds_path(f"{world.kind}_controller")
+    controller = Controller(CONTROLLER_NODE, eds, world, drives, nvm_path)
+    controller.readers[0x1018, 4] = lambda: serial
+    return controller

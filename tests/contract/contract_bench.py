@@ -8,13 +8,15 @@ import numpy as np
 
 from app.files.machines import load_machine
 from drivers.canopen import CanopenController
-from drivers.contract import ControllerBench, PoseBench, TrackerBench
+from drivers.contract import ControllerBench, MotorsBench, PoseBench, TrackerBench
+from drivers.drives.kind import KIND as DRIVES
 from drivers.emscon import EmsconTracker
 from drivers.emscon.settings import EmsconSettings
 from drivers.gcs import GcsController
 from drivers.gcs.pose_kind import KIND as POSE
-from drivers.interface import MotionController, PoseMover, Tracker
+from drivers.interface import MotionController, Motors, PoseMover, Tracker
 from drivers.kind import ActuatorFacts, Surroundings
+from mocks.canopen.bare_site import bare_site
 from mocks.canopen.server import CanopenStation
 from mocks.clock import ScaledClock
 from mocks.gcs.server import GcsStation
@@ -121,8 +123,49 @@ async def pose_bench() -> AsyncIterator[PoseBench]:
         station.stop()
 
 
+@contextlib.asynccontextmanager
+async def motors_bench(mode: str = "profile") -> AsyncIterator[MotorsBench]:
+    """Bare drives on a machine whose moves between the places take a second of wall time."""
+    clock = ScaledClock(1.0)
+    world = World(clock, WorldPlan(seed=4))
+    station = CanopenStation(world, bare=True)
+    facts = tuple(
+        ActuatorFacts(a.name, a.unit, a.home, a.limits) for a in load_machine("hexapod").actuators
+    )
+    home = tuple(fact.home for fact in facts)
+    ways = (16.0, -3.0, 9.0, 12.0, -7.0, 5.0)
+
+    async def connect() -> Motors:
+        host, port = station.address
+        stated = bare_site(world, f"socket://{host}:{port}", station.serials) | {"mode": mode}
+        stated["eds"] = [stated["eds"]]
+        settings = {one.name: stated.get(one.name, one.default) for one in DRIVES.settings}
+        return await DRIVES.open(Surroundings(settings, "", "hexapod", facts, {}, 1.0))
+
+    async def silence() -> None:
+        world.faults.inject("heartbeat-silent:3")
+
+    async def stall() -> None:
+        world.legs[-1].stalled = True
+
+    station.start()
+    try:
+        yield MotorsBench(
+            open=connect,
+            longest_s=LONGEST_S,
+            actuators=facts,
+            places=(home, tuple(map(sum, zip(home, ways, strict=True)))),
+            unreachable=(*home[:-1], facts[-1].limits[1] + 1.0),
+            silence=silence,
+            stall=stall,
+        )
+    finally:
+        station.stop()
+
+
 TRACKERS: dict[str, Callable[..., contextlib.AbstractAsyncContextManager[TrackerBench]]] = {
     "emscon": emscon_bench,
 }
 CONTROLLERS = {"canopen": "hexapod", "gcs": "tripod"}
 POSE_MOVERS = {"pose": pose_bench}
+MOTORS = {"drives": motors_bench}

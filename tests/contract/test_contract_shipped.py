@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pytest
-from contract_bench import CONTROLLERS, POSE_MOVERS, TRACKERS, controller_bench
+from contract_bench import CONTROLLERS, MOTORS, POSE_MOVERS, TRACKERS, controller_bench
 
 from app.devices import kind_names
-from drivers.contract import CONTROLLER_LAWS, POSE_LAWS, TRACKER_LAWS, Law, why_not
+from drivers.contract import CONTROLLER_LAWS, MOTORS_LAWS, POSE_LAWS, TRACKER_LAWS, Law, why_not
 
 
 @pytest.mark.parametrize("law", TRACKER_LAWS, ids=str)
@@ -27,6 +27,15 @@ async def test_controller(kind: str, law: Law, tmp_path: Path) -> None:
         await law.run(bench)
 
 
+@pytest.mark.parametrize("law", MOTORS_LAWS, ids=str)
+@pytest.mark.parametrize("kind", MOTORS)
+async def test_motors(kind: str, law: Law) -> None:
+    async with MOTORS[kind]() as bench:
+        if reason := await why_not(law, bench):
+            pytest.skip(reason)
+        await law.run(bench)
+
+
 @pytest.mark.parametrize("law", POSE_LAWS, ids=str)
 @pytest.mark.parametrize("kind", POSE_MOVERS)
 async def test_pose_mover(kind: str, law: Law) -> None:
@@ -38,4 +47,4 @@ async def test_pose_mover(kind: str, law: Law) -> None:
 
 def test_every_kind_that_ships_has_a_bench() -> None:
     assert set(TRACKERS) == set(kind_names("tracker"))
-    assert {*CONTROLLERS, *POSE_MOVERS} == set(kind_names("controller"))
+    assert {*CONTROLLERS, *MOTORS, *POSE_MOVERS} == set(kind_names("controller"))

@@ -1,0 +1,1 @@
+"""CiA 402 drives alone: they take actuator values, and the host computes the legs."""
