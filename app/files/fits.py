@@ -47,6 +47,8 @@ class SavedFit:
     """Texts of the operator's own effects by their id: with them the file is complete."""
     machine_file: str = ""
     """A lab's own machine file, from the folder of this one; empty for a shipped machine."""
+    controller_serial: str = ""
+    """Serial number of the controller on which all runs were taken; empty if it is not known."""
     controller: Mapping[str, float] = field(default_factory=dict)
     """The controller's own parameters in the last run; nominal where they are missing."""
     load: Load | None = None
@@ -97,6 +99,7 @@ def fit_of(top: TomlTable, source: str) -> SavedFit:
         compensation=top.numbers_by_name("compensation") if top.has("compensation") else None,
         own={name: own.text(name) for name in own},
         machine_file=top.text("machine_file", ""),
+        controller_serial=top.text("controller_serial", ""),
         controller=top.numbers_by_name("controller"),
         load=load_of(top.table("load", required=False)) if top.has("load") else None,
         region=_region(top.table("measured")) if top.has("measured") else None,

@@ -44,6 +44,12 @@ def compensation_of(fit: Fit) -> dict[str, float]:
     return held[0]
 
 
+def controller_serial(fit: Fit) -> str:
+    """The controller on which all runs were taken; empty if unknown, or not the same in all."""
+    serials = {run.header.controller_serial for run in fit.model.rows.runs}
+    return serials.pop() if len(serials) == 1 else ""
+
+
 def write_model(path: Path, fit: Fit) -> None:
     """Write what a fit found, correlations included."""
     report = fit_report(fit)
@@ -54,6 +60,7 @@ def write_model(path: Path, fit: Fit) -> None:
         "format": MODEL_FORMAT,
         "machine": fit.model.machine.name,
         "machine_file": _machine_file(fit.model.machine, path),
+        "controller_serial": controller_serial(fit),
         "runs": [run.source for run in fit.model.rows.runs],
         "effects": report["effects"],
         "compensation": compensation_of(fit),

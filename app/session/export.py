@@ -8,7 +8,7 @@ import numpy as np
 from app.files.runs import write_run
 from app.files.site import Site
 from app.files.text import read_text
-from app.session.journal import FRAME, PARAMETERS, Journal, Row
+from app.session.journal import FRAME, IDENTITIES, PARAMETERS, Journal, Row
 from app.session.plan import Plan
 from calib.arrays import Array
 from calib.runs import Digits, Header, Run, covariance_matrices
@@ -32,7 +32,7 @@ def export_run(site: Site, plan: Plan, journal: Journal, folder: Path) -> Path:
     after which nothing was read stays as a row without a reading, since the next direction of
     approach depends on it.
     """
-    header = _header(site, plan, journal.meta(PARAMETERS, {}), journal.meta(FRAME, {}))
+    header = _header(site, plan, journal)
     if header.machine == MACHINE:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / MACHINE).write_text(read_text(Path(site.machine.source)), encoding="utf-8")
@@ -41,19 +41,25 @@ def export_run(site: Site, plan: Plan, journal: Journal, folder: Path) -> Path:
     return folder
 
 
-def _header(site: Site, plan: Plan, held: Mapping[str, float], frame: Mapping[str, str]) -> Header:
+def _header(site: Site, plan: Plan, journal: Journal) -> Header:
     known = site.machine.parameter_index
+    held: Mapping[str, float] = journal.meta(PARAMETERS, {})
+    serials = {role: who["serial"] for role, who in journal.meta(IDENTITIES, {}).items()}
+    tracker = {"model": site.tracker.model, "reflector": site.tracker.reflector}
+    if serials.get("tracker"):
+        tracker["serial"] = serials["tracker"]
     if site.controller.hosted:  # q is what the machine was sent: nothing was done beyond it
         held = {}
     return Header(
         machine=MACHINE if site.machine_name.endswith(".toml") else site.machine_name,
         title=plan.title,
-        tracker={"model": site.tracker.model, "reflector": site.tracker.reflector},
+        tracker=tracker,
         platform_nests={name: np.array(place) for name, place in site.platform_nests.items()},
         base_nests={name: np.array(place) for name, place in site.base_nests.items()},
+        controller_serial=serials.get("controller", ""),
         controller_parameters={name: v for name, v in held.items() if name in known},
         compensation={name: v for name, v in held.items() if name not in known and v != 0.0},
-        controller_frame=frame,
+        controller_frame=journal.meta(FRAME, {}),
         load=site.load,
     )
 

@@ -42,6 +42,7 @@ CREATE TABLE IF NOT EXISTS notes (
 """
 
 PARAMETERS, SMRS, FRAME = "controller_parameters", "smrs", "controller_frame"
+IDENTITIES = "identities"
 """Facts about a session: what the controller held at connect, nest of each SMR by its number, what
 the poses of a closed controller refer to."""
 PENDING = ("planned", "started", "failed")

@@ -59,7 +59,9 @@ class Corrections:
 
         def judge() -> Comparison:
             fit = read_fit(model)
-            proposal, checked = judged(station.site, Gates.with_limits({}), fit, held)
+            proposal, checked = judged(
+                station.site, Gates.with_limits({}), fit, held, station.controller.identity.serial
+            )
             return Comparison(model, proposal, tuple(checked))
 
         # Arithmetic goes beside the event loop: stop key and drivers must not wait for it.

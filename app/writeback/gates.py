@@ -26,6 +26,7 @@ from calib.pose_error import Summary
 from calib.poses import verification_poses
 
 LIMITS: dict[str, float] = {
+    "machine": 0.0,
     "finite": 0.0,
     "tolerance": 5.0,
     "chi2": 4.0,
@@ -83,12 +84,14 @@ def gates_of_proposal(
     proposal: Proposal,
     held: Mapping[str, float],
     hosted: HostedSets | None = None,
+    serial: str = "",
 ) -> list[GateChecked]:
-    """Everything that can be judged before the controller is touched."""
+    """Everything that can be judged before the controller with this serial number is touched."""
     new_values = proposal.values
     odd = [name for name, value in new_values.items() if not math.isfinite(value)]
     odd += [c.name for c in proposal.changes if not math.isfinite(c.sigma) or c.sigma < 0.0]
-    checked = [gates.check("finite", len(odd), "", "values that are not finite numbers")]
+    checked = [_of_this_machine(gates, fit, serial)]
+    checked.append(gates.check("finite", len(odd), "", "values that are not finite numbers"))
     if odd:
         return checked
     far = {
@@ -108,6 +111,20 @@ def gates_of_proposal(
     old = machine.vector({p.name: held[p.name] for p in machine.parameters})
     new = machine.vector({p.name: new_values[p.name] for p in machine.parameters})
     return checked + _over_workspace(gates, machine, fit, old, new, hosted)
+
+
+def _of_this_machine(gates: Gates, fit: SavedFit, serial: str) -> GateChecked:
+    """Whether the runs were taken on another machine of the type; silence is no objection."""
+    known = bool(fit.controller_serial and serial)
+    other = known and fit.controller_serial != serial
+    says = (
+        f"the fit is of the controller with serial {fit.controller_serial}, {serial} answers"
+        if other
+        else f"serial {serial} answers, as when it was measured"
+        if known
+        else "serial numbers are not known; other machines"
+    )
+    return gates.check("machine", float(other), "", says)
 
 
 def _over_workspace(

@@ -87,7 +87,9 @@ class WriteBack:
         """
         site = self.station.site
         held = await compare_with_known(site, self.station.controller)
-        proposal, checked = judged(site, self.gates, self.fit, held)
+        proposal, checked = judged(
+            site, self.gates, self.fit, held, self.station.controller.identity.serial
+        )
         for gate in checked:
             self.station.observers.tell(gate)
         refuse_if_any(checked, "Nothing was written. Measure more, or fit again")
@@ -198,17 +200,30 @@ class WriteBack:
 
 
 def judged(
-    site: Site, gates: Gates, fit: SavedFit, held: Held
+    site: Site, gates: Gates, fit: SavedFit, held: Held, serial: str = ""
 ) -> tuple[Proposal, list[GateChecked]]:
-    """What a fit would change in what the controller holds, and every gate before writing."""
+    """What a fit would change in what the controller holds, and every gate before writing.
+
+    ``serial`` is that of the controller that answers.
+
+    Raises
+    ------
+    GateRefused
+        If the controller holds the fit's values already.
+    """
     machine, hosted = site.machine, site.controller.hosted
     proposal = propose(machine, fit, held.values, hosted=hosted)
+    if all(change.new == change.old for change in proposal.changes):
+        raise GateRefused(
+            "the controller holds this fit already",
+            remedy="There is nothing to write; measure the machine again to see how good it is",
+        )
     sets = None
     if hosted and all(math.isfinite(value) for value in proposal.values.values()):
         old = ParameterSet(held.values, held.own)
         new = ParameterSet(proposal.over(held.values), proposal.own)
         sets = HostedSets(*(one.identified(machine, site.load) for one in (old, new)))
-    return proposal, gates_of_proposal(gates, machine, fit, proposal, held.values, sets)
+    return proposal, gates_of_proposal(gates, machine, fit, proposal, held.values, sets, serial)
 
 
 async def _put_back(station: Station, snapshot: Snapshot, *, stored: bool) -> None:

@@ -37,6 +37,8 @@ class Header:
     tracker: Mapping[str, Any] = field(default_factory=dict)
     platform_nests: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     base_nests: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    controller_serial: str = ""
+    """Serial number of the controller, and so of the machine; empty where nobody wrote it down."""
     controller_parameters: Mapping[str, float] = field(default_factory=dict)
     compensation: Mapping[str, float] = field(default_factory=dict)
     """What the controller compensated meanwhile, by its own names; missing is zero."""
@@ -99,6 +101,7 @@ def header_of(top: TomlTable, parameters: Collection[str] | None = None) -> Head
         tracker=_tracker(top),
         platform_nests={name: np.array(platform.numbers(name, 3, unit="mm")) for name in platform},
         base_nests={name: np.array(base.numbers(name, 3, unit="mm")) for name in base},
+        controller_serial=controller.text("serial", ""),
         controller_parameters=_controller_parameters(controller, parameters),
         compensation=controller.numbers_by_name("compensation"),
         controller_frame=_texts(controller.named("frame", required=False)),

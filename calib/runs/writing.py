@@ -65,8 +65,9 @@ def format_header(header: Header) -> str:
         "compensation": header.compensation,
         "frame": header.controller_frame,
     }
-    if any(held.values()):
-        table["controller"] = {name: dict(values) for name, values in held.items() if values}
+    serial = {"serial": header.controller_serial} if header.controller_serial else {}
+    if serial or any(held.values()):
+        table["controller"] = serial | {n: dict(values) for n, values in held.items() if values}
     if header.load is not None:
         table["load"] = {
             "gravity": header.load.gravity.tolist(),

@@ -40,6 +40,7 @@ def headers(draw):
         tracker=draw(st.dictionaries(NAME, st.one_of(NAME, NUMBER, st.booleans()), max_size=2)),
         platform_nests={name: draw(vectors()) for name in names[:cut]},
         base_nests={name: draw(vectors()) for name in names[cut:]},
+        controller_serial=draw(NAME),
         controller_parameters=draw(values),
         compensation=draw(values),
         controller_frame=draw(st.dictionaries(NAME.filter(bool), NAME, max_size=2)),

@@ -66,6 +66,20 @@ def test_poses_not_seen_may_err_twice_as_much_as_a_perfect_model_shows(over: flo
     assert failed(fit) == (["holdout"] if over > 2.0 else [])
 
 
+@pytest.mark.parametrize(
+    ("measured", "answers", "passes"),
+    [("17", "17", True), ("17", "18", False), ("", "18", True), ("17", "", True)],
+)
+def test_a_fit_of_another_machine_of_the_type_is_refused(
+    measured: str, answers: str, passes: bool
+) -> None:
+    fit = replace(made(), controller_serial=measured)
+    proposal = propose(MACHINE, fit, HELD)
+    checked = gates_of_proposal(GATES, MACHINE, fit, proposal, HELD, serial=answers)
+    assert [gate.gate for gate in checked if not gate.passed] == ([] if passes else ["machine"])
+    assert passes or "18 answers" in checked[0].says
+
+
 def test_a_change_is_told_in_standard_uncertainties() -> None:
     change = Change("leg1.L0", 230.0, 230.1, 0.02, "mm", True)
     assert change.in_sigmas == pytest.approx(5.0)

@@ -4,7 +4,7 @@ import asyncio
 
 from app.errors import StoppedByOperator
 from app.hosted.controller import HostedController
-from app.session.journal import FRAME, PARAMETERS
+from app.session.journal import FRAME, IDENTITIES, PARAMETERS
 from app.session.known import compare_with_known
 from app.session.path import check_waypoints, waypoints
 from app.session.plan import Step
@@ -49,7 +49,7 @@ async def connect(work: Work, step: Step) -> Done:
         "tracker": vars(work.tracker.identity),
     }
     work.journal.set_meta(PARAMETERS, held.values)
-    work.journal.set_meta("identities", identities)
+    work.journal.set_meta(IDENTITIES, identities)
     if isinstance(work.controller, HostedController):
         work.journal.set_meta(FRAME, await work.controller.frame())
     await take_stock(work)
