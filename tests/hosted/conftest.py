@@ -8,6 +8,7 @@ import pytest
 
 from app.devices import _found
 
+EXAMPLE = Path(__file__).parents[2] / "examples" / "line_motors"
 POINT = "[pkmcal.controllers]\nline-motors = line_motors:KIND\n"
 
 
@@ -24,7 +25,7 @@ def line_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
     about.mkdir(parents=True)
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: line-motors\nVersion: 1.0\n")
     (about / "entry_points.txt").write_text(POINT)
-    monkeypatch.setattr(sys, "path", [str(folder), str(Path(__file__).parent), *sys.path])
+    monkeypatch.setattr(sys, "path", [str(folder), str(EXAMPLE), *sys.path])
     _found.cache_clear()
     yield folder
     _found.cache_clear()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import tomli_w
-from line_motors import LegsOfWorld, LineServer
+from line_device import LegsOfWorld, LineServer
 
 from app.files.site import Site, parse_site
 from calib.mechanism.rigid import Poses, pose_difference
@@ -38,7 +38,11 @@ class Lab:
         table = {
             "format": "pkm-site/1",
             "machine": "hexapod",
-            "controller": {"kind": "line-motors", "port": self.motors.port, "store": "store"},
+            "controller": {
+                "kind": "line-motors",
+                "address": f"127.0.0.1:{self.motors.port}",
+                "store": "store",
+            },
             "tracker": {
                 "kind": "emscon",
                 "address": self.tracker.address,

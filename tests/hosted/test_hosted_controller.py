@@ -3,10 +3,11 @@
 import contextlib
 from collections.abc import AsyncIterator
 from pathlib import Path
+from runpy import run_path
 
 import numpy as np
 import pytest
-from line_motors import BareAxes, LineMotors, LineServer
+from line_device import BareAxes, LineServer
 
 from app.files.machines import load_machine
 from app.hosted.controller import HostedController
@@ -16,11 +17,13 @@ from app.hosted.store import HostStore
 from calib.mechanism.solve import forward, inverse
 from drivers.contract import CONTROLLER_LAWS, ControllerBench, Law, why_not
 from drivers.errors import ParameterError, Refused
-from drivers.interface import MotionController
-from drivers.kind import ActuatorFacts
+from drivers.interface import MotionController, Motors
+from drivers.kind import ActuatorFacts, Surroundings
 
 MACHINE = load_machine("hexapod")
-NAMES = [actuator.name for actuator in MACHINE.actuators]
+FACTS = tuple(ActuatorFacts(a.name, a.unit, a.home, a.limits) for a in MACHINE.actuators)
+EXAMPLE = Path(__file__).parents[2] / "examples" / "line_motors" / "line_motors.py"
+KIND = run_path(str(EXAMPLE))["KIND"]
 HOME = (0.0, 0.0, 220.0, 0.0, 0.0, 0.0)
 POSE = (4.0, -7.0, 224.0, 0.03, -0.05, 0.02)
 
@@ -38,7 +41,11 @@ async def device() -> AsyncIterator[LineServer]:
 async def connect(server: LineServer, folder: Path) -> HostedController:
     store = HostStore(folder, MACHINE)
     store.open()
-    motors = await LineMotors.connect(server.port, NAMES)
+    motors: Motors = await KIND.open(
+        Surroundings(
+            {"address": f"127.0.0.1:{server.port}", "silence_s": 2.0}, "", "hexapod", FACTS, {}
+        )
+    )
     return HostedController(MACHINE, ByMotors(motors, MACHINE), store)
 
 
@@ -55,9 +62,7 @@ async def test_it_holds_the_laws_of_controllers(law: Law[ControllerBench], tmp_p
         bench = ControllerBench(
             open=opened,
             longest_s=20.0,
-            actuators=tuple(
-                ActuatorFacts(a.name, a.unit, a.home, a.limits) for a in MACHINE.actuators
-            ),
+            actuators=FACTS,
             poses=(HOME, (0.0, 0.0, 206.0, 0.0, 0.0, 0.0)),
             unreachable=(0.0, 0.0, 5000.0, 0.0, 0.0, 0.0),
             parameter="leg1.B_x",
