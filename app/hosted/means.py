@@ -124,12 +124,13 @@ class ByPoses:
         return replace(said, actuators=actuators)
 
     async def home(self, actuator: str) -> None:
-        """Find the reference of every pose axis that has none: they have one together."""
+        """Find the reference of every pose axis that has none: they may have one together."""
         if actuator not in [one.name for one in self._machine.actuators]:
             raise Refused(f"there is no actuator {actuator}", device=self.device.identity.kind)
-        for axis in (await self.device.state()).actuators:
-            if not axis.homed:
-                await self.device.home(axis.name)
+        for name in [axis.name for axis in (await self.device.state()).actuators]:
+            found = {axis.name: axis.homed for axis in (await self.device.state()).actuators}
+            if not found[name]:
+                await self.device.home(name)
 
     async def frame(self) -> dict[str, str]:
         """Pivot, coordinate system and rotation order, as it says them."""

@@ -2,7 +2,7 @@
 
 from drivers.errors import DeviceError, DeviceFault, DriveFault, Refused
 
-UNKNOWN_COMMAND = 2
+UNKNOWN_COMMAND, STARTING = 2, 63
 NOT_ENABLED, STOPPED, UNKNOWN_PARAMETER, MOTION_ERROR = 5, 10, 54, 1024
 
 WORDS = {
@@ -33,7 +33,7 @@ WORDS = {
     56: ("wrong password", "Check the passwords in the site file."),
     60: ("the parameter is protected", "Check the command level's password in the site file."),
     64: ("the parameter is read only", ""),
-    63: ("it is still starting up", "Wait until it is ready, then try again."),
+    STARTING: ("it is still starting up", "Wait until it is ready, then try again."),
     93: ("not allowed while an axis moves", "Stop the machine first."),
     95: ("not allowed while servos are on", "Disable motion first, then try again."),
     305: ("its memory cannot be written", "The old values are still stored."),

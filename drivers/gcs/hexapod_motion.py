@@ -12,7 +12,7 @@ from typing import TypeVar
 
 from drivers.errors import DeviceError, DeviceFault, DriveFault, LinkError, Refused, Silence
 from drivers.gcs.answers import numbers
-from drivers.gcs.errors import NOT_ENABLED, UNKNOWN_COMMAND
+from drivers.gcs.errors import NOT_ENABLED, STARTING, UNKNOWN_COMMAND
 from drivers.gcs.line import ANSWER_S, Line
 from drivers.gcs.link import GcsLink
 
@@ -52,7 +52,13 @@ class HexapodMotion:
         powered, known = self._powered, self._known
         if not powered:
             return
-        servo = all(self._ask(line, "SVO?", timeout))
+        try:
+            servo = all(self._ask(line, "SVO?", timeout))
+        except Refused as error:
+            if error.code == STARTING:
+                self._link.latch("restart", _restarted(self._device))
+                return
+            raise
         if servo or not self._powered:
             return
         if known and not all(self._ask(line, "FRF?", timeout)):

@@ -15,7 +15,7 @@ FIRMWARE = "1.0.0"
 # Not plain HEXAPOD: PI's client takes a controller of that name for one of GCS 1.
 PRODUCT = "PKM-HEXAPOD"
 PIVOT = "RST"
-ALWAYS = ("*IDN?", "ERR?", "CSV?")
+ALWAYS = ("*IDN?", "ERR?", "CSV?", "HLP?", "SAI?")
 SINGLE_BYTES = {"#5": "Request Motion Status", "#7": "Request Controller Ready Status",
                 "#24": "Stop All Axes"}  # fmt: skip
 
