@@ -161,13 +161,14 @@ class Nodes:
             return
         if "link" not in self.link.faults:
             try:
-                await asyncio.wait_for(self._farewell(), FAREWELL_DEADLINE_S)
+                await asyncio.wait_for(self.farewell(), FAREWELL_DEADLINE_S)
             except (DeviceError, TimeoutError) as error:
                 what = f"closed without a farewell ({error}); the drives stop by themselves"
                 self.alarm(Alarm(self.devices[0].label, what))
         await self.link.close()
 
-    async def _farewell(self) -> None:
+    async def farewell(self) -> None:
+        """Take the power off, and let the nodes forget this PC."""
         await self.send_stop(DISABLE_VOLTAGE)
         forget = [d.call(partial(d.download, 0x1016, 1, bytes(4))) for d in self.devices]
         await asyncio.gather(*forget)

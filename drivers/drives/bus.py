@@ -48,7 +48,7 @@ class DriveBus(Nodes):
         identities = []
         for n, (drive, axis) in enumerate(zip(self.drives, self.axes, strict=True)):
             identities.append(await self._recognise(drive, axis))
-            ask = partial(counts_of, drive, axis, self.plan.feed_unit)
+            ask = partial(counts_of, drive, axis, self.plan.feed_unit, self.plan.believe)
             counts = await drive.remote.call(ask)
             self.axes[n] = replace(axis, counts=counts)
             self._set_ups[axis.node] = SetUp(drive, self.axes[n], self.plan)
@@ -80,6 +80,11 @@ class DriveBus(Nodes):
             if self.plan.cyclic:
                 await map_setpoint(set_up.drive, axis.node, self.plan.sync_s)
         await super().watch()
+
+    async def farewell(self) -> None:
+        """As of any nodes; and limits are those that the drives held before."""
+        await super().farewell()
+        await asyncio.gather(*(set_up.give_back() for set_up in self._set_ups.values()))
 
     def window(self, axis: Axis) -> int:
         """How many counts from its target a drive has arrived."""

@@ -77,8 +77,12 @@ KIND: Kind[Motors] = Kind(
             "drive's 0x60A8, or 0x608F, 0x6091 and 0x6092", check=_positive,
         ),
         Setting(
-            "feed_unit", "number", "size of one unit of 0x6092, mm or rad; 0: 0x6092 says nothing",
-            1.0, least=0.0,
+            "feed_unit", "number", "size of one unit of 0x6092, mm or rad; 0: nobody knows", 0.0,
+            least=0.0,
+        ),
+        Setting(
+            "factors", "text", "whether the drive's own 0x60A8, 0x608F, 0x6091 and 0x6092 must "
+            "agree with counts_per_unit", "believe", choices=("believe", "ignore"),
         ),
         _each("sign", "1, or -1 where the drive counts down as q grows", check=_signs),
         _each("offset", "q at the drive's zero, mm or rad; left out, q at home"),

@@ -77,10 +77,10 @@ class DriveMotors:
         try:
             bus = DriveBus(link, plan)
             identity = await bus.recognise()
-            await bus.watch()
-            await bus.note_faults()
             motors = cls(bus, identity)
             await motors._check_place()
+            await bus.watch()
+            await bus.note_faults()
         except BaseException:
             await link.close()
             raise
@@ -270,7 +270,8 @@ class DriveMotors:
                     f"{axis.name} = {value:.6g} {axis.unit} is outside {lowest:.6g} to "
                     f"{highest:.6g}",
                     device=f"drive {axis.name} (node {axis.node})",
-                    remedy="Nothing was commanded. Choose values within the limits.",
+                    remedy="Nothing was commanded. Choose values within the limits; they are the "
+                    "narrower of the site file's and those that 0x607D held at connect.",
                 )
             counts.append(target)
         return counts

@@ -47,7 +47,8 @@ class Plan:
 
     address: BusAddress
     axes: tuple[Axis, ...]
-    feed_unit: float = 1.0
+    feed_unit: float = 0.0
+    believe: bool = True
     window: float = 0.0
     referenced: Referenced = Referenced()
     quick_stop: int = 2
@@ -75,6 +76,7 @@ def plan_of(around: Surroundings) -> Plan:
         address=address,
         axes=_axes(around),
         feed_unit=settings["feed_unit"],
+        believe=settings["factors"] == "believe",
         window=settings["window"],
         referenced=referenced,
         quick_stop=settings["quick_stop"],

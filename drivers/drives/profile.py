@@ -41,8 +41,8 @@ class Profile:
     def at(self, time: float) -> float:
         """Part s of the way that is behind after ``time`` s, on a trapezoidal ramp."""
         end = self.duration
-        if time >= end:
-            return 1.0
+        if time <= 0.0 or time >= end:
+            return float(time > 0.0 or not end)
         if time > 0.5 * end:
             return 1.0 - self.at(end - time)
         ramp = min(self.rate / self.acceleration, 0.5 * end)

@@ -19,6 +19,7 @@ class SetUp:
         self._plan = plan
         self.window = 0
         self.limits = axis.limits_in_counts()
+        self._found: tuple[int, ...] | None = None
 
     async def run(self) -> None:
         """Write everything that does not stand there; raises Refused."""
@@ -51,6 +52,8 @@ class SetUp:
         low, high = self._axis.limits_in_counts()
         if self.drive.has(LIMITS, 1) and self.drive.has(LIMITS, 2):
             held = [await self.drive.read(LIMITS, sub) for sub in (1, 2)]
+            if self._found is None:
+                self._found = tuple(held)
             if held[0] < held[1]:
                 low, high = max(low, held[0]), min(high, held[1])
             if low >= high:
@@ -67,6 +70,12 @@ class SetUp:
             if now != [low, high]:
                 raise self._cannot("hold limits", LIMITS, low, f"it holds {now}")
         self.limits = low, high
+
+    async def give_back(self) -> None:
+        """Let the drive hold the limits that it held before: the next site file may allow more."""
+        if self._found is not None and self._found != self.limits:
+            for sub, value in enumerate(self._found, start=1):
+                await self.drive.write(LIMITS, value, sub)
 
     async def _read_window(self) -> int:
         if self._plan.window:
