@@ -61,8 +61,9 @@ class Scaled:
     def half_solved(self, columns: Array) -> Array:
         """L^-1 S columns, (p,) or (p, m)."""
         scaled = (columns.T * self.scale).T
-        return np.asarray(linalg.solve_triangular(self._factor, scaled, lower=True))
+        return np.asarray(linalg.solve_triangular(self.factor, scaled, lower=True))
 
     @cached_property
-    def _factor(self) -> Array:
+    def factor(self) -> Array:
+        """L (p, p), lower triangular."""
         return np.asarray(linalg.cholesky(self.matrix, lower=True))

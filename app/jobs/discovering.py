@@ -64,6 +64,35 @@ class UnexplainedEntry(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
+class NoiseComponentEntry(Record):
+    """A component of the noise: ``correlated`` (its time constant, s), ``visit`` or ``scale``.
+
+    ``visit`` is the standard deviation of every actuator from visit to visit of a pose, mm or rad;
+    ``scale`` that of the readings over what they state. ``clear``: no chance (p below 1e-3); others
+    only count in judging effects.
+    """
+
+    name: str
+    value: float
+    sigma: float | None
+    unit: str
+    p_value: float
+    clear: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoiseEntry(Record):
+    """The noise that the readings demand; none of them: independent, as stated.
+
+    ``uncertainty_ratio``: uncertainties with it over those without, the median.
+    """
+
+    components: tuple[NoiseComponentEntry, ...]
+    uncertainty_ratio: float
+    words: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class DiagnosisReport(Report):
     """What is missing from a model (``pkm-diagnosis/1``); the best candidate first."""
 
@@ -74,6 +103,7 @@ class DiagnosisReport(Report):
     candidates: tuple[CandidateEntry, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
     unexplained: UnexplainedEntry
+    noise: NoiseEntry
     bad_readings: tuple[BadReadingEntry, ...]
     unavailable: Mapping[str, str]
     not_on_this_machine: Mapping[str, str]
@@ -82,10 +112,19 @@ class DiagnosisReport(Report):
 
 @dataclass(frozen=True, kw_only=True)
 class StepEntry(Record):
-    """A model on the way; None as ``added`` is the one to begin with."""
+    """A model on the way; None as ``added`` is the one to begin with.
+
+    ``p_value`` (family-wise), ``log_evidence`` (log Bayes factor against nothing) and ``rivals``
+    (effects that this run cannot tell from it) are those of the effect when it was added; ``weak``:
+    such a p-value may well be chance.
+    """
 
     added: str | None
     removed: str | None = None
+    p_value: float | None = None
+    log_evidence: float | None = None
+    weak: bool = False
+    rivals: tuple[str, ...] = ()
     chi2_per_dof: float | None
     rms_um: float | None
     noise_floor_um: float | None
@@ -104,6 +143,7 @@ class DiscoveryReport(Report):
     record: tuple[RemarkEntry, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
     unexplained: UnexplainedEntry
+    noise: NoiseEntry
     bad_readings: tuple[BadReadingEntry, ...]
     unavailable: Mapping[str, str]
     parameters: tuple[SizeEntry, ...]

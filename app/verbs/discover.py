@@ -56,13 +56,14 @@ def words(report: dict[str, Any]) -> str:
             um(step["holdout_rms_um"]),
             um(step["holdout_floor_um"]),
             f"{step['chi2_per_dof']:.3f}",
+            _chance(step),
         )
         for step in report["steps"]
     ]
     lines = [
         *record_lines(report),
         answer.table(
-            ("step", "RMS", "perfect", "held-out", "perfect", "chi2/dof"),
+            ("step", "RMS", "perfect", "held-out", "perfect", "chi2/dof", "p"),
             steps,
         ),
         "",
@@ -79,6 +80,13 @@ def words(report: dict[str, Any]) -> str:
         channels = ", ".join(report["unexplained"]["channels"])
         lines.append(f"Structure is left that no known effect explains; it depends on: {channels}")
     return "\n".join([*lines, *bad_lines(report), "", report["advice"], *not_asked(report)])
+
+
+def _chance(step: dict[str, Any]) -> str:
+    """p-value of what was added; weak where chance may well do it."""
+    if step.get("p_value") is None:
+        return ""
+    return f"{step['p_value']:.1g}{' (weak)' if step['weak'] else ''}"
 
 
 def _in_the_model(report: dict[str, Any]) -> list[str]:

@@ -1,13 +1,15 @@
 """Diagnosis of a fitted run: which effect is missing, how large, and what adding it would bring."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
+from calib.arrays import Array, BoolArray
 from calib.discover.problem import effect_candidates, quadratics_of, variables_of
 from calib.effects.component import Effect
+from calib.evidence.candidate import Candidate
 from calib.evidence.diagnosis import diagnose
 from calib.evidence.findings import Diagnosis, Finding
 from calib.evidence.structure import structure_candidates
@@ -15,6 +17,7 @@ from calib.identify.fitting import Fit
 from calib.identify.holdout import HoldOut, hold_out, hold_out_of
 from calib.identify.signatures import EffectColumns, effect_columns
 from calib.model.columns import whitened_columns
+from calib.noise import Found, Whitening
 from calib.scaled import Scaled, normal_matrix
 from calib.unknown import Estimate, estimates_of, linear_among
 
@@ -36,12 +39,16 @@ class RunDiagnosis:
     """A fit, what is missing from it, and the signatures of the candidates.
 
     ``unavailable`` says why some effects of the catalogue cannot be seen in these readings.
+    ``noise`` is what the fit counts with, ``inflation`` the ratio of its uncertainties to those of
+    independent readings.
     """
 
     fit: Fit
     diagnosis: Diagnosis
     effects: tuple[EffectColumns, ...]
     unavailable: dict[str, str]
+    noise: Found = field(default_factory=Found)
+    inflation: float = 1.0
 
     @cached_property
     def holdout(self) -> HoldOut:
@@ -66,19 +73,36 @@ class RunDiagnosis:
             [fitted.prior_precision * fitted.model.deviation(linear.state), 0.0 * sigma]
         )
         accepted = fitted.accepted & one.known
-        chosen = jacobian[:, :, accepted].reshape(precision.size, -1)
+        chosen, residual = self._freed(jacobian, accepted), self._freed(linear.whitened, accepted)
         covariance = Scaled.of(normal_matrix(chosen, precision)).inverse()
-        step = covariance @ (chosen @ linear.whitened[:, accepted].reshape(-1) - pull)
+        step = covariance @ (chosen @ residual - pull)
         spread = np.sqrt(np.diag(covariance))
         left = linear.whitened - np.tensordot(step, jacobian, axes=1)
         natural = rows.in_mm(left[:, accepted], accepted)
-        held = hold_out_of(rows, accepted, linear.whitened, jacobian, precision, pull)
+        held = hold_out_of(fitted, linear.whitened, jacobian, precision, pull, accepted)
         values = np.where(linear_among(one.unknowns), step[-sigma.size :], values)
         return Outlook(
             rms_mm=float(np.sqrt(np.mean(np.sum(natural**2, axis=0)))),
             holdout=held,
             estimates=estimates_of(one.unknowns, values, spread[-sigma.size :]),
         )
+
+    def _freed(self, columns: Array, which: BoolArray) -> Array:
+        """Columns (..., 3, N) of some readings, freed of the noise that they share, (..., 3 M)."""
+        chosen = columns[..., which]
+        if self.fit.whitening is not None:
+            chosen = Whitening(self.fit.taking_of(which), self.fit.noise).apply(chosen)
+        return chosen.reshape(*columns.shape[:-2], -1)
+
+
+def _freed(fitted: Fit, one: Candidate) -> Candidate:
+    """A candidate in stated sigmas, freed of the noise that the accepted readings share."""
+    if fitted.whitening is None:
+        return one
+    shape = one.columns.shape
+    return replace(
+        one, columns=fitted.whitening.apply(one.columns.reshape(*shape[:2], 3, -1)).reshape(shape)
+    )
 
 
 def diagnose_fit(
@@ -100,7 +124,7 @@ def diagnose_fit(
     answer = diagnose(
         problem,
         effect_candidates(fitted, problem, columns),
-        structure_candidates(variables_of(fitted)),
+        [_freed(fitted, one) for one in structure_candidates(variables_of(fitted))],
         quadratics_of(fitted),
         rng=generator,
     )

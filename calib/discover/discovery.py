@@ -6,7 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from calib.discover.diagnosis import RunDiagnosis, diagnose_fit
+from calib.discover.diagnosis import RunDiagnosis
+from calib.discover.noise import judge
 from calib.effects.component import Effect
 from calib.errors import BadInput
 from calib.evidence.findings import Diagnosis
@@ -48,16 +49,17 @@ class RunStage:
     @property
     def doubtful(self) -> frozenset[str]:
         """Effects whose estimates are not far from nothing for their uncertainty (Wald's test)."""
-        model = self.fit.model
+        fit = self.run.fit
+        model = fit.model
         first, found = model.free.size, []
         for effect, group in zip(model.effects, model.unknowns, strict=True):
             which = first + np.flatnonzero(linear_among(group))
             first += len(group)
-            sigma = self.fit.sigmas[which]
-            distance = (self.fit.values[which] - model.centre[which]) / sigma
-            alike = self.fit.covariance[np.ix_(which, which)] / sigma / sigma[:, None]
+            sigma = fit.sigmas[which]
+            distance = (fit.values[which] - model.centre[which]) / sigma
+            alike = fit.covariance[np.ix_(which, which)] / sigma / sigma[:, None]
             chi2 = np.array([distance @ np.linalg.solve(alike, distance)])
-            chi2 /= max(1.0, self.fit.chi2_per_dof)
+            chi2 /= max(1.0, fit.chi2_per_dof)
             if log_tail(chi2, which.size)[0] > BEYOND_DOUBT:
                 found.append(effect.id)
         return frozenset(found)
@@ -107,8 +109,7 @@ class Refitter:
         return self._stages[names]
 
     def _examine(self, fitted: Fit) -> RunDiagnosis:
-        known = tuple(self.effects.values())
-        return diagnose_fit(fitted, known, np.random.default_rng(self._seed))
+        return judge(fitted, tuple(self.effects.values()), self._seed)
 
     def _effect(self, name: str) -> Effect:
         try:

@@ -9,7 +9,7 @@ import numpy as np
 
 from calib.arrays import Array
 from calib.effects.tracker import rigid_motions
-from calib.evidence.candidate import Candidate, fill_missing
+from calib.evidence.candidate import Candidate, fill_missing, unit_errors
 from calib.evidence.problem import LinearProblem
 from calib.evidence.quadratic import Neighbours, Quadratic, rigid_blocks
 from calib.evidence.structure import Response, Variable
@@ -26,10 +26,14 @@ def effect_candidates(
 
 
 def _candidate(fit: Fit, problem: LinearProblem, one: EffectColumns) -> Candidate:
-    columns = accepted(fit, one.columns)
+    columns = fit.whiten(one.columns)
     missing = np.tile(~one.known[fit.accepted], 3)
     if missing.any():
-        columns = fill_missing(problem, columns, missing)
+        errors = unit_errors(missing)
+        if fit.whitening is not None:
+            freed = fit.whitening.apply(errors.reshape(errors.shape[0], 3, -1))
+            errors = freed.reshape(errors.shape)
+        columns = fill_missing(problem, columns, missing, errors)
     linear = tuple(unknown for unknown in one.unknowns if not unknown.nonlinear)
     subsets = one.effect.parts(fit.model.rows)
     return Candidate(one.effect.id, linear, columns, one.trials, subsets=subsets)
@@ -53,7 +57,7 @@ def each_leg(fit: Fit) -> list[Response]:
 
 
 def accepted(fit: Fit, columns: Array) -> Array:
-    """(..., 3, N) -> (..., 3 A), contiguous."""
+    """(..., 3, N) -> (..., 3 A), in stated sigmas, contiguous."""
     chosen = columns if fit.accepted.all() else columns[..., fit.accepted]
     return np.ascontiguousarray(chosen.reshape(*columns.shape[:-2], -1))
 

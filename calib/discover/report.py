@@ -9,6 +9,7 @@ from scipy import special
 from calib.discover.agreement import TOGETHER_WORSE, runs_at_odds, untrue_uncertainties
 from calib.discover.diagnosis import RunDiagnosis
 from calib.discover.discovery import stage_of
+from calib.discover.noise_report import noise_report, noise_words
 from calib.effects import not_defined
 from calib.evidence.findings import Diagnosis, Finding
 from calib.evidence.forward import Discovery
@@ -20,6 +21,8 @@ from calib.runs.remark import Remark, plain_remarks
 from calib.unknown import Estimate, estimates_of, linear_among
 
 FEW_POSES = 15
+WEAK = 1e-3
+"""p-value above which what is called for may well be chance: one in twenty runs shows such."""
 
 
 def diagnosis_report(found: RunDiagnosis) -> dict[str, Any]:
@@ -37,6 +40,7 @@ def diagnosis_report(found: RunDiagnosis) -> dict[str, Any]:
         "candidates": [_candidate(found, finding) for finding in diagnosis.findings],
         "indistinguishable": [list(group) for group in diagnosis.indistinguishable],
         "unexplained": _unexplained(diagnosis),
+        "noise": noise_report(found),
         "bad_readings": bad_readings(found.fit),
         "unavailable": found.unavailable,
         "not_on_this_machine": not_defined(found.fit.model.machine),
@@ -54,6 +58,7 @@ def discovery_report(discovery: Discovery) -> dict[str, Any]:
             {
                 "added": step.added,
                 **({"removed": step.removed} if step.removed else {}),
+                **_called_for(discovery, number),
                 **_quality(stage_of(discovery, number).run),
             }
             for number, step in enumerate(discovery.steps)
@@ -63,6 +68,7 @@ def discovery_report(discovery: Discovery) -> dict[str, Any]:
         "record": plain_remarks(record),
         "indistinguishable": [list(group) for group in _groups(discovery)],
         "unexplained": _unexplained(last.diagnosis),
+        "noise": noise_report(last),
         "bad_readings": bad_readings(last.fit),
         "parameters": effect_parameters(last.fit),
         "refused": list(discovery.refused),
@@ -79,6 +85,24 @@ def _record(found: RunDiagnosis) -> tuple[Remark, ...]:
     effect = found.columns_of(best.name).effect
     offered = judged(effect, found.outlook(best).estimates, found.fit)
     return (*record_of(found.fit), *offered)
+
+
+def _called_for(discovery: Discovery, number: int) -> dict[str, Any]:
+    """p-value, evidence and rivals of an effect when it was added."""
+    added = discovery.steps[number].added
+    if added is None:
+        return {}
+    before = stage_of(discovery, number - 1).run.diagnosis
+    finding = next((one for one in before.findings if one.name == added), None)
+    if finding is None:
+        return {}
+    rivals = [name for group in before.indistinguishable if group[0] == added for name in group]
+    return {
+        "p_value": finding.p_value,
+        "log_evidence": finding.log_evidence,
+        "weak": finding.p_value > WEAK,
+        "rivals": [name for name in rivals if name != added],
+    }
 
 
 def _groups(discovery: Discovery) -> list[tuple[str, ...]]:
@@ -175,7 +199,13 @@ def _of_physics(found: RunDiagnosis, refused: Sequence[str]) -> str:
         named = "one pose" if poses == 1 else f"{poses} poses"
         excluded += f" With {named} only large effects would show: measure more."
     scatter = untrue_uncertainties(found.fit)
+    told = noise_words(found)
+    if told:
+        excluded = f" As to noise: {told}.{excluded}"
     if diagnosis.adequate:
+        if told:
+            excluded = excluded.removeprefix(" As to noise:")
+            return f"Nothing else is missing:{excluded}"
         if scatter:
             return (
                 f"Nothing is missing that these readings show. {scatter}: correct them.{excluded}"

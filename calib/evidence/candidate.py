@@ -76,18 +76,32 @@ class Candidate:
         )
 
 
-def fill_missing(problem: LinearProblem, columns: Array, missing: BoolArray) -> Array:
+def fill_missing(
+    problem: LinearProblem, columns: Array, missing: BoolArray, errors: Array | None = None
+) -> Array:
     """Leave rows out for one candidate only: columns (..., R) with ``missing`` (R,) rows replaced.
 
-    Leaving rows m out equals freeing one unknown for each. That makes A' M vanish at m:
-    with A zero at m, A'_m = -(A M)_m (M_mm)^-1, everything else of A unchanged.
+    Leaving rows out equals freeing an error of each; ``errors`` (m, R) are their columns, unit
+    vectors E where nothing is given, else what has become of these in readings that were freed of
+    shared noise. That adds to A, zero at the rows, what makes A' M E^T vanish:
+    A' = A - (A M E^T) (E M E^T)^-1 E.
     """
-    columns = np.where(missing, 0.0, columns)
+    if errors is None:
+        columns = np.where(missing, 0.0, columns)
+        errors = unit_errors(missing)
     if not missing.any():
         return columns
-    projected = problem.project(columns)[..., missing]
-    absorbed = problem.absorbed[:, missing]
-    block = np.eye(int(missing.sum())) * (1.0 + 1e-9) - absorbed.T @ absorbed
-    flat = projected.reshape(-1, projected.shape[-1])
-    columns[..., missing] = -np.linalg.solve(block, flat.T).T.reshape(projected.shape)
-    return columns
+    projected = problem.project(errors)
+    block = projected @ errors.T
+    block[np.diag_indices_from(block)] *= 1.0 + 1e-9
+    flat = columns.reshape(-1, columns.shape[-1])
+    taken = np.linalg.solve(block, projected @ flat.T)
+    return np.asarray((flat - taken.T @ errors).reshape(columns.shape))
+
+
+def unit_errors(missing: BoolArray) -> Array:
+    """One unit vector (m, R) for each of the rows ``missing`` (R,)."""
+    where = np.flatnonzero(missing)
+    errors = np.zeros((where.size, missing.size))
+    errors[np.arange(where.size), where] = 1.0
+    return errors

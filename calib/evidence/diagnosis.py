@@ -13,7 +13,7 @@ from calib.arrays import Array
 from calib.evidence.bayes import observed
 from calib.evidence.candidate import Candidate
 from calib.evidence.family import ALPHA, significant
-from calib.evidence.findings import Dependence, Diagnosis, Finding, Unexplained
+from calib.evidence.findings import Dependence, Diagnosis, Finding, Joined, Unexplained
 from calib.evidence.pairs import rivals
 from calib.evidence.problem import LinearProblem
 from calib.evidence.quadratic import Quadratic
@@ -23,6 +23,7 @@ from calib.evidence.rounds import (
     at_least,
     best_hypothesis,
     explore,
+    joining,
     signature_of,
 )
 from calib.evidence.scores import Scores, score
@@ -94,7 +95,25 @@ def diagnose(
         scatter=float(last.scores.squares[0]) / max(last.scores.problem.trace, 1.0),
         scores=scores,
         family=first.family,
+        joined=tuple(
+            Joined(scores.candidates[index].name, evidence, *joining(judged.scores, index))
+            for judged, (index, evidence) in zip(found.rounds, chosen, strict=False)
+        ),
+        structure=_structure(last, alpha),
+        quadratic_log_p=tuple(map(float, first.family.own_log_p[len(scores.candidates) :])),
     )
+
+
+def _structure(judged: Round, alpha: float) -> Joined | None:
+    """Significant structure with the most evidence, as columns."""
+    scores = judged.scores
+    others = range(len(judged.effects), len(scores.candidates))
+    called = [index for index in others if significant(judged.log_p(index), alpha)]
+    if not called:
+        return None
+    best = max(called, key=lambda index: observed(scores, index)[0])
+    name, evidence = scores.candidates[best].name, observed(scores, best)[0]
+    return Joined(name, evidence, *joining(scores, best))
 
 
 def _groups(found: Exploration, alpha: float) -> list[tuple[int, ...]]:

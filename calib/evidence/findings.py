@@ -77,6 +77,16 @@ class Unexplained:
 
 
 @dataclass(frozen=True, eq=False)
+class Joined:
+    """What joined the linearised fit in a diagnosis: columns (k, R), prior precision (k,)."""
+
+    name: str
+    log_evidence: float
+    columns: Array
+    precision: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Diagnosis:
     """Answer to "what is missing?".
 
@@ -97,6 +107,12 @@ class Diagnosis:
     scatter : float
         Variance of the readings beyond what was stated, once everything significant is in; 1 is
         as stated.
+    joined : tuple of Joined
+        ``explained_by`` as columns of the linearised fit.
+    structure : Joined or None
+        Structure with the most evidence, of what is significant beside them.
+    quadratic_log_p : tuple of float
+        log p of each quadratic test on its own, before anything joined.
     """
 
     findings: tuple[Finding, ...]
@@ -108,6 +124,9 @@ class Diagnosis:
     scatter: float
     scores: Scores = field(repr=False)
     family: Family = field(repr=False)
+    joined: tuple[Joined, ...] = field(default=(), repr=False)
+    structure: Joined | None = field(default=None, repr=False)
+    quadratic_log_p: tuple[float, ...] = ()
 
     @property
     def best(self) -> Finding | None:

@@ -14,6 +14,7 @@ from calib.identify.starting import bad_reading, begin
 from calib.mechanism.rigid import euler_rates, to_euler
 from calib.model.prediction import Model
 from calib.model.state import Linearised, State
+from calib.noise import WHITE, Noise, Taking, Whitening
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +35,11 @@ class Fit:
         Gauss-Newton steps taken.
     gross : tuple of BadReading
         Of the bad ones, those where no nest can be, whatever the effects.
+    settled : bool
+        False where the fit still improved when its steps ran out: the best point is the answer.
+    noise, whitening : Noise, Whitening or None
+        Components of the noise that the optimum counts with, and what frees the accepted readings
+        of what they share; None where the readings are taken as independent, as stated.
     """
 
     model: Model
@@ -43,17 +49,40 @@ class Fit:
     step_covariance: Array
     steps: int
     gross: tuple[BadReading, ...]
+    settled: bool = True
+    noise: Noise = WHITE
+    whitening: Whitening | None = None
+
+    def whiten(self, columns: Array) -> Array:
+        """Columns (..., 3, N) in stated sigmas for the accepted readings, white, (..., 3 A)."""
+        chosen = columns if self.accepted.all() else columns[..., self.accepted]
+        if self.whitening is not None:
+            chosen = self.whitening.apply(chosen)
+        return np.ascontiguousarray(chosen.reshape(*columns.shape[:-2], -1))
 
     @cached_property
     def jacobian(self) -> Array:
         """Whitened derivatives of the accepted readings, (p, 3 A)."""
-        chosen = self.linear.jacobian[:, :, self.accepted]
-        return chosen.reshape(chosen.shape[0], -1)
+        return self.whiten(self.linear.jacobian)
 
     @cached_property
     def whitened(self) -> Array:
-        """Accepted residuals in sigmas, (3 A,)."""
-        return self.linear.whitened[:, self.accepted].reshape(-1)
+        """Accepted residuals in sigmas, made white, (3 A,)."""
+        return self.whiten(self.linear.whitened)
+
+    @property
+    def taking(self) -> Taking:
+        """How the accepted readings were taken."""
+        return self.taking_of(self.accepted)
+
+    def taking_of(self, kept: BoolArray) -> Taking:
+        """How readings (N,) were taken."""
+        rows = self.model.rows
+        usual = np.array([axis.usual_error for axis in rows.machine.axes])
+        columns = self.linear.situation.actuator_columns * rows.on_platform
+        visit = np.where(rows.on_platform, rows.path.stop[rows.at], -1)
+        motions = (usual[:, None, None] * columns)[:, :, kept]
+        return Taking(rows.run[kept], rows.time_s[kept], visit[kept], motions)
 
     @cached_property
     def prior_precision(self) -> Array:
@@ -89,8 +118,14 @@ class Fit:
 
     @cached_property
     def chi2(self) -> float:
-        """Sum of squared residuals in sigmas over accepted readings."""
-        return float(self.whitened @ self.whitened)
+        """Sum of squared residuals in stated sigmas over accepted readings."""
+        return float(np.sum(self.linear.whitened[:, self.accepted] ** 2))
+
+    @cached_property
+    def cost(self) -> float:
+        """What the fit has made least: squared residuals, made white, and the priors' part."""
+        prior = self.prior_precision * self.model.deviation(self.linear.state) ** 2
+        return float(self.whitened @ self.whitened + np.sum(prior))
 
     @cached_property
     def trace_hat(self) -> float:
@@ -116,8 +151,8 @@ class Fit:
     @cached_property
     def noise_floor_mm(self) -> float:
         """What ``rms_mm`` would be for a perfect model: sqrt(mean tr(Sigma - J C J^T))."""
-        covariance = self.model.rows.covariance[:, :, self.accepted]
-        total = np.einsum("iin->", covariance) - self.explained(self.step_covariance, self.accepted)
+        total = noise_variance(self, self.accepted)
+        total -= self.explained(self.step_covariance, self.accepted)
         return float(np.sqrt(max(total, 0.0) / self.readings))
 
     def explained(self, covariance: Array, which: BoolArray) -> float:
@@ -125,6 +160,31 @@ class Fit:
         jacobian = self.model.rows.in_mm(self.linear.jacobian[:, :, which], which)
         flat = jacobian.reshape(jacobian.shape[0], -1)
         return float(np.sum(flat * (covariance @ flat)))
+
+
+def noise_variance(fit: Fit, which: BoolArray) -> float:
+    """Sum over readings of the variance of their noise, whatever they share of it, mm^2."""
+    rows, noise = fit.model.rows, fit.noise
+    total = noise.scale**2 * float(np.einsum("iin->", rows.covariance[:, :, which]))
+    if noise.visit > 0.0:
+        usual = noise.visit * np.array([axis.usual_error for axis in rows.machine.axes])
+        moved = rows.in_mm(
+            (fit.linear.situation.actuator_columns * rows.on_platform)[..., which], which
+        )
+        total += float(np.sum((usual[:, None, None] * moved) ** 2))
+    return total
+
+
+def with_noise(fit: Fit, noise: Noise) -> Fit:
+    """The same readings fitted with what their noise really is."""
+    if noise == WHITE:
+        return fit
+    whitening = Whitening(fit.taking, noise)
+    found = optimise(fit.model, fit.linear, fit.accepted, whitening)
+    return replace(
+        fit, linear=found.linear, step_covariance=found.covariance, noise=noise,
+        steps=fit.steps + found.steps, settled=fit.settled and found.settled, whitening=whitening,
+    )  # fmt: skip
 
 
 def frame_values(state: State, run: int) -> Array:
@@ -172,8 +232,8 @@ def fit(
     accepted[[reading.row for reading in bad]] = False
     steps = 0
     for _ in range(3):
-        linear, covariance, taken = optimise(model, linear, accepted)
-        steps += taken
+        optimum = optimise(model, linear, accepted)
+        linear, steps = optimum.linear, steps + optimum.steps
         found = strays(linear.whitened, linear.jacobian, 1.0 / model.prior**2, accepted)
         if not found:
             break
@@ -183,7 +243,8 @@ def fit(
                 bad_reading(model, row, f"stray: {1000 * miss:.3g} um from where it should be")
             )
             accepted[row] = False
-    return Fit(model, linear, accepted, tuple(bad), covariance, steps, tuple(gross))
+    covariance, settled = optimum.covariance, optimum.settled
+    return Fit(model, linear, accepted, tuple(bad), covariance, steps, tuple(gross), settled)
 
 
 def _with_frames(start: State, begun: State) -> State:

@@ -5,13 +5,14 @@ all readings and takes the one Gauss-Newton step to the optimum without the fold
 neglects is of second order in a step of the size of the parameters' uncertainty.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from calib.arrays import Array, BoolArray
-from calib.identify.fitting import Fit
-from calib.runs.stack import Rows
+from calib.identify.fitting import Fit, noise_variance
+from calib.noise import Whitening
 from calib.scaled import Scaled, normal_matrix
 
 
@@ -30,48 +31,82 @@ def hold_out(fit: Fit) -> HoldOut:
     The floor is sqrt(mean tr(Sigma + J C J^T)) with C the covariance of the fold's fit. Answers
     nan if there are fewer than two poses.
     """
-    pull = fit.prior_precision * fit.model.deviation(fit.linear.state)
     linear = fit.linear
-    return hold_out_of(
-        fit.model.rows, fit.accepted, linear.whitened, linear.jacobian, fit.prior_precision, pull
-    )
+    pull = fit.prior_precision * fit.model.deviation(linear.state)
+    return hold_out_of(fit, linear.whitened, linear.jacobian, fit.prior_precision, pull)
 
 
 def hold_out_of(
-    rows: Rows,
-    accepted: BoolArray,
+    fit: Fit,
     whitened: Array,
     jacobian: Array,
     precision: Array,
     pull: Array,
+    which: BoolArray | None = None,
 ) -> HoldOut:
-    """Hold-out of any linearised model of these readings.
+    """Hold-out of any linearised model of a fit's readings, with the noise of the fit.
 
     Parameters
     ----------
     whitened, jacobian : (3, N), (p, 3, N)
-        Residuals and derivatives in sigmas, near the optimum.
+        Residuals and derivatives in stated sigmas, near the optimum.
     precision, pull : (p,)
         1 / sigma^2 of the priors, and that times the distance from their means.
+    which : (N,) bool, optional
+        Readings, if not all that the fit has accepted.
     """
-    chosen = jacobian[:, :, accepted].reshape(jacobian.shape[0], -1)
-    normal = normal_matrix(chosen, precision)
-    slope = chosen @ whitened[:, accepted].reshape(-1) - pull
+    rows = fit.model.rows
+    accepted = fit.accepted if which is None else which
+    learn = _independent if fit.whitening is None else _sharing
     squares, floor, count = 0.0, 0.0, 0
+    teach = learn(fit, whitened, jacobian, precision, pull, accepted)
     for fold in np.unique(rows.fold[rows.fold >= 0]):
         held = (rows.fold == fold) & accepted
         if not held.any() or held.sum() == accepted.sum():
             continue
         own = jacobian[:, :, held]
-        block = own.reshape(own.shape[0], -1)
-        inverse = Scaled.of(normal - block @ block.T).inverse()
-        step = inverse @ (slope - block @ whitened[:, held].reshape(-1))
-        off = whitened[:, held] - np.tensordot(step, own, axes=1)
+        inverse, slope = teach(held)
+        off = whitened[:, held] - np.tensordot(inverse @ slope, own, axes=1)
         squares += float(np.sum(rows.in_mm(off, held) ** 2))
-        floor += float(np.einsum("iin->", rows.covariance[:, :, held]))
+        floor += noise_variance(fit, held)
         natural = rows.in_mm(own, held).reshape(own.shape[0], -1)
         floor += float(np.sum(natural * (inverse @ natural)))
         count += int(held.sum())
     if count == 0:
         return HoldOut(float("nan"), float("nan"), 0)
     return HoldOut(float(np.sqrt(squares / count)), float(np.sqrt(floor / count)), count)
+
+
+Teach = Callable[[BoolArray], tuple[Array, Array]]
+"""Readings held out -> covariance (p, p) and slope (p,) of the fit to all others."""
+
+
+def _independent(
+    fit: Fit, whitened: Array, jacobian: Array, precision: Array, pull: Array, accepted: BoolArray
+) -> Teach:
+    """Readings that share no noise: the held-out ones' part is taken off the normal equations."""
+    chosen = jacobian[:, :, accepted].reshape(jacobian.shape[0], -1)
+    normal = normal_matrix(chosen, precision)
+    slope = chosen @ whitened[:, accepted].reshape(-1) - pull
+
+    def teach(held: BoolArray) -> tuple[Array, Array]:
+        block = jacobian[:, :, held].reshape(jacobian.shape[0], -1)
+        left = slope - block @ whitened[:, held].reshape(-1)
+        return Scaled.of(normal - block @ block.T).inverse(), left
+
+    return teach
+
+
+def _sharing(
+    fit: Fit, whitened: Array, jacobian: Array, precision: Array, pull: Array, accepted: BoolArray
+) -> Teach:
+    """Readings that share noise: those left are freed of theirs anew."""
+
+    def teach(held: BoolArray) -> tuple[Array, Array]:
+        left = accepted & ~held
+        whitening = Whitening(fit.taking_of(left), fit.noise)
+        chosen = whitening.apply(jacobian[:, :, left]).reshape(jacobian.shape[0], -1)
+        residual = whitening.apply(whitened[:, left]).reshape(-1)
+        return Scaled.of(normal_matrix(chosen, precision)).inverse(), chosen @ residual - pull
+
+    return teach

@@ -9,15 +9,24 @@ scaled to a unit diagonal before the Cholesky factorisation: the priors keep it 
 and the frames, which have none, are seen by every reading.
 """
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 
 from calib.arrays import Array, BoolArray
 from calib.errors import BadInput
 from calib.model.prediction import Model
 from calib.model.state import Linearised
+from calib.noise import Whitening
 from calib.scaled import Scaled, normal_matrix
 
-MAX_STEPS = 30
+MAX_STEPS = 150
+"""Steps after which the best point is the answer, settled or not."""
+STRAIGHT = 12
+"""Steps after which a valley is taken to be bent: steps are damped (Levenberg and Marquardt)."""
+POOR, GOOD = 0.25, 0.75
+"""Fall of the cost over the predicted one below which damping rises, above which it falls."""
 LEAST_FALL = 1e-3
 """Fall of chi-square below which nothing is gained by a better step."""
 ENOUGH = 0.8
@@ -32,51 +41,66 @@ TOLERANCE = 1e-6
 """Steps end when the predicted fall of chi-square is below this, or below 1e-9 of it."""
 
 
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """Where the fit ended: linearisation, covariance of a step (p, p), steps taken.
+
+    ``settled`` is false where the cost still fell when the steps ran out, or no step was possible.
+    """
+
+    linear: Linearised
+    covariance: Array
+    steps: int
+    settled: bool
+
+
 def optimise(
-    model: Model, linear: Linearised, accepted: BoolArray
-) -> tuple[Linearised, Array, int]:
-    """Damped Gauss-Newton; returns the optimum, the covariance of the unknowns and the steps."""
-    precision = 1.0 / model.prior**2
-    cost = _cost(model, linear, accepted, precision)
+    model: Model, linear: Linearised, accepted: BoolArray, whitening: Whitening | None = None
+) -> Optimum:
+    """Damped Gauss-Newton over the accepted readings (N,), freed of the noise that they share."""
+    readings = _Readings(model, accepted, whitening)
+    cost = readings.cost(linear)
     damping, stalled = 0.0, 0
-    for taken in range(1, MAX_STEPS + 1):
-        normal, slope = _normal_equations(model, linear, accepted, precision)
+    for taken in range(MAX_STEPS):
+        normal, slope = readings.normal_equations(linear)
         while True:
             step = normal.solve(slope, damping)
             fall = float(step @ slope)
             if fall <= max(TOLERANCE, 1e-9 * cost) or stalled == 2:
-                return linear, normal.inverse(), taken - 1
+                return Optimum(linear, normal.inverse(), taken, True)
             trial = _attempt(model, linear, step)
             if trial is not None:
-                reached = _cost(model, trial, accepted, precision)
-                trial, reached = _shortened(
-                    model, linear, step, (trial, reached, cost - reached, fall), accepted, precision
-                )
+                reached = readings.cost(trial)
+                if taken < STRAIGHT:
+                    tried = (trial, reached, cost - reached, fall)
+                    trial, reached = _shortened(readings, linear, step, tried)
                 if reached <= cost * (1.0 + 1e-12) or fall < LEAST_FALL:
                     break
             damping = max(10.0 * damping, 1e-4)
             if damping > 1e8:
-                raise BadInput(
-                    "the fit does not converge",
-                    remedy="Check that the run belongs to this machine; see its residuals",
-                )
-        damping *= 0.1 if damping > 1e-6 else 0.0
+                return Optimum(linear, normal.inverse(), taken, False)
+        damping = _damped(damping, (cost - reached) / fall, bent=taken + 1 >= STRAIGHT)
         worth = cost / (3.0 * accepted.sum())
         stalled = stalled + 1 if abs(cost - reached) < STALLED * worth else 0
         linear, cost = trial, reached
-    raise BadInput(
-        f"the fit has not converged in {MAX_STEPS} steps",
-        remedy="Check that the run belongs to this machine; see its residuals",
-    )
+    normal, _ = readings.normal_equations(linear)
+    return Optimum(linear, normal.inverse(), MAX_STEPS, False)
+
+
+def _damped(damping: float, ratio: float, *, bent: bool) -> float:
+    """Damping of the next step, by how much of the predicted fall (at most twice) has come."""
+    if bent and ratio < POOR:
+        return max(4.0 * damping, 1e-4)
+    if bent and ratio < GOOD:
+        return damping
+    return 0.1 * damping if damping > 1e-6 else 0.0
 
 
 def _shortened(
-    model: Model,
+    readings: "_Readings",
     linear: Linearised,
     step: Array,
     tried: tuple[Linearised, float, float, float],
-    accepted: BoolArray,
-    precision: Array,
 ) -> tuple[Linearised, float]:
     """Take less of a step that overshoots: a period may zigzag about its optimum for ever.
 
@@ -87,10 +111,10 @@ def _shortened(
     best = fall / max(2.0 * fall - fallen, 1e-300)
     if best > ENOUGH or fall < LEAST_FALL:
         return trial, reached
-    shorter = _attempt(model, linear, best * step)
+    shorter = _attempt(readings.model, linear, best * step)
     if shorter is None:
         return trial, reached
-    cost = _cost(model, shorter, accepted, precision)
+    cost = readings.cost(shorter)
     return (shorter, cost) if cost < reached else (trial, reached)
 
 
@@ -101,19 +125,33 @@ def _attempt(model: Model, linear: Linearised, step: Array) -> Linearised | None
         return None
 
 
-def _cost(model: Model, linear: Linearised, accepted: BoolArray, precision: Array) -> float:
-    residual = linear.whitened[:, accepted]
-    return float(np.sum(residual**2) + np.sum(precision * model.deviation(linear.state) ** 2))
+@dataclass(frozen=True, eq=False)
+class _Readings:
+    """The accepted readings of a model, and what frees them of noise that they share."""
 
+    model: Model
+    accepted: BoolArray
+    whitening: Whitening | None
 
-def _normal_equations(
-    model: Model, linear: Linearised, accepted: BoolArray, precision: Array
-) -> tuple[Scaled, Array]:
-    """Normal matrix and slope (p,)."""
-    jacobian = linear.jacobian
-    if not accepted.all():
-        jacobian = jacobian[:, :, accepted]
-    flat = jacobian.reshape(jacobian.shape[0], -1)
-    slope = flat @ linear.whitened[:, accepted].reshape(-1)
-    slope -= precision * model.deviation(linear.state)
-    return Scaled.of(normal_matrix(flat, precision)), slope
+    @cached_property
+    def precision(self) -> Array:
+        return np.asarray(1.0 / self.model.prior**2)
+
+    def white(self, columns: Array) -> Array:
+        """(..., 3, N) -> (..., 3 A)."""
+        chosen = columns if self.accepted.all() else columns[..., self.accepted]
+        if self.whitening is not None:
+            chosen = self.whitening.apply(chosen)
+        return chosen.reshape(*columns.shape[:-2], -1)
+
+    def cost(self, linear: Linearised) -> float:
+        """Squared residuals, made white, and the priors' part."""
+        prior = self.precision * self.model.deviation(linear.state) ** 2
+        return float(np.sum(self.white(linear.whitened) ** 2) + np.sum(prior))
+
+    def normal_equations(self, linear: Linearised) -> tuple[Scaled, Array]:
+        """Normal matrix and slope (p,)."""
+        flat = self.white(linear.jacobian)
+        slope = flat @ self.white(linear.whitened)
+        slope -= self.precision * self.model.deviation(linear.state)
+        return Scaled.of(normal_matrix(flat, self.precision)), slope

@@ -97,8 +97,7 @@ def _searched(latest: Fit, one: EffectColumns) -> State:
 def _best_trial(latest: Fit, one: EffectColumns) -> tuple[int, Array]:
     """Trial with the largest fall of chi-square, and its amplitudes."""
     problem = latest.problem
-    columns = one.columns[..., latest.accepted]
-    columns = columns.reshape(*one.columns.shape[:2], -1)
+    columns = latest.whiten(one.columns)
     projected = problem.project(columns)
     sizes = np.array([u.prior_sigma for u in one.unknowns if not u.nonlinear])
     weight = columns @ projected.swapaxes(1, 2) + np.diag(1.0 / sizes**2)

@@ -1,0 +1,85 @@
+"""What is missing, judged against the noise that the readings themselves demand.
+
+First the readings are taken as independent, as they state. Where that leaves something to be
+explained, components of noise compete with it: they are estimated with every effect that was
+called for in the fit, so that no effect passes for noise; then the same question is asked again
+with that noise, and what was noise is no longer called for. Structure of unknown origin stands
+against noise by its evidence: where it says more than noise would, noise is what is left beside it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from calib.discover.diagnosis import RunDiagnosis, diagnose_fit
+from calib.effects.component import Effect
+from calib.evidence.findings import Joined
+from calib.evidence.problem import LinearProblem
+from calib.identify.fitting import Fit, with_noise
+from calib.noise import estimate
+
+CLEAR = float(np.log(1e-3))
+"""log p of a test of structure, on its own, from which noise is asked for in an adequate model."""
+SCATTER = 5.0
+"""Standard deviations by which chi-square is off, from which the same holds."""
+ROUNDS = 3
+
+
+def judge(fit: Fit, catalogue: Sequence[Effect], seed: int) -> RunDiagnosis:
+    """Ask what is missing from a fit, against its noise.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of independent readings.
+    catalogue : sequence of Effect
+    seed : int
+        Of the null draws.
+    """
+    white = diagnose_fit(fit, catalogue, np.random.default_rng(seed))
+    if not _suspicious(white):
+        return white
+    problem, taking = fit.problem, fit.taking
+    kept = white.diagnosis.joined
+    found = estimate(_enlarged(problem, kept), taking)
+    structure = white.diagnosis.structure
+    if structure is not None and structure.log_evidence > 0.0:
+        beside = estimate(_enlarged(problem, (*kept, structure)), taking)
+        if structure.log_evidence + beside.gain > found.gain:
+            found = beside
+    answer = white
+    for _ in range(ROUNDS):
+        if not found.components:
+            return answer
+        noisy = with_noise(fit, found.noise)
+        answer = diagnose_fit(noisy, catalogue, np.random.default_rng(seed))
+        answer = replace(answer, noise=found, inflation=inflation(fit, noisy))
+        still = {one.name for one in answer.diagnosis.joined}
+        left = tuple(one for one in kept if one.name in still)
+        if len(left) == len(kept):
+            break
+        kept = left
+        found = estimate(_enlarged(problem, kept), taking)
+    return answer
+
+
+def inflation(white: Fit, noisy: Fit) -> float:
+    """Median ratio of the uncertainties with noise and as stated, over what is identified."""
+    known = white.sigmas < 0.5 * white.model.prior
+    return float(np.median(noisy.sigmas[known] / white.sigmas[known])) if known.any() else 1.0
+
+
+def _suspicious(white: RunDiagnosis) -> bool:
+    fit = white.fit
+    if not fit.dof > 0:
+        return False
+    off = abs(fit.chi2 - fit.dof) / np.sqrt(2.0 * fit.dof)
+    alike = min(white.diagnosis.quadratic_log_p, default=0.0)
+    return not white.diagnosis.adequate or off > SCATTER or alike < CLEAR
+
+
+def _enlarged(problem: LinearProblem, joined: Sequence[Joined]) -> LinearProblem:
+    for one in joined:
+        problem = problem.with_columns(one.columns, one.precision)
+    return problem

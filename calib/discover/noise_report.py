@@ -1,0 +1,80 @@
+"""What the noise is: as data, and in words."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from calib.discover.diagnosis import RunDiagnosis
+from calib.noise import Component
+
+CLEAR = 1e-3
+"""p-value up to which a component is spoken of; a weaker one only counts in judging effects."""
+
+
+def noise_report(found: RunDiagnosis) -> dict[str, Any]:
+    """Entry ``noise`` of diagnosis and discovery."""
+    return {
+        "components": [_entry(found, one) for one in found.noise.components],
+        "uncertainty_ratio": found.inflation,
+        "words": noise_words(found),
+    }
+
+
+def noise_words(found: RunDiagnosis) -> str:
+    """What is clear of the noise, without a full stop; empty if the readings are as they say."""
+    told = [_says(found, one) for one in found.noise.components if one.p_value < CLEAR]
+    if not told:
+        return ""
+    return f"{'; '.join(told)}. Uncertainties are {found.inflation:.2g} times those of white noise"
+
+
+def _entry(found: RunDiagnosis, one: Component) -> dict[str, Any]:
+    size, unit = _scale(found, one)
+    return {
+        "name": one.name,
+        "value": size * one.value,
+        "sigma": size * one.sigma if math.isfinite(one.sigma) else None,
+        "unit": unit,
+        "p_value": one.p_value,
+        "clear": one.p_value < CLEAR,
+    }
+
+
+def _scale(found: RunDiagnosis, one: Component) -> tuple[float, str]:
+    """Factor and unit of a component's value: s, a ratio, or the first actuator's unit."""
+    if one.name == "correlated":
+        return 1.0, "s"
+    if one.name == "scale":
+        return 1.0, "1"
+    axis = found.fit.model.rows.machine.axes[0]
+    return axis.usual_error, axis.unit
+
+
+def _says(found: RunDiagnosis, one: Component) -> str:
+    size, unit = _scale(found, one)
+    if one.name == "correlated":
+        noise = found.noise.noise
+        alike = noise.share * float(np.exp(-found.fit.taking.usual_gap_s / one.value))
+        return (
+            f"the noise is correlated over {_time(one.value, one.sigma)} "
+            f"({alike:.2f} between successive readings)"
+        )
+    if one.name == "scale":
+        return (
+            f"readings scatter {one.value:.2f} +- {one.sigma:.2f} times as much as sx, sy, sz say"
+        )
+    factor, unit = (1000.0, "um") if unit == "mm" else (1e6, "urad")
+    value, sigma = factor * size * one.value, factor * size * one.sigma
+    return (
+        f"each visit of a pose errs as a whole, every actuator by {value:.2g} +- {sigma:.1g} "
+        f"{unit}: "
+        "the machine repeats no better, or depends on the pose in a way that no column shows "
+        "(poses that are visited twice tell)"
+    )
+
+
+def _time(value: float, sigma: float) -> str:
+    if value >= 120.0:
+        return f"{value / 60.0:.2g} +- {sigma / 60.0:.1g} min"
+    return f"{value:.2g} +- {sigma:.1g} s"

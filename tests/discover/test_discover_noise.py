@@ -1,0 +1,48 @@
+"""Runs whose noise is not white: the noise is named, and no effect or structure is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.files.machines import load_machine
+from calib.discover.discovery import Refitter, discover_run, stage_of
+from calib.discover.noise_report import noise_words
+from calib.effects import catalogue
+from calib.runs import parse_run
+from calib.runs.stack import Rows, stack
+from mocks.hidden.table import Hidden
+from mocks.simulate.files import points_csv, run_toml
+from mocks.simulate.plan import RunPlan
+from mocks.simulate.run import simulate
+
+SIGMA_MM = 0.005
+
+
+def measured(hidden: dict[str, float], rho: float, seed: int) -> Rows:
+    """A run of the hexapod; its noise follows itself from reading to reading."""
+    plan = RunPlan(machine="hexapod", seed=seed, poses=40, noise_mm=SIGMA_MM, hidden=Hidden(hidden))
+    clean = simulate(plan)
+    exact = parse_run(run_toml(clean), points_csv(clean), actuators=6)
+    rows = stack(load_machine("hexapod"), [exact])
+    quiet = stack(load_machine("hexapod"), [parse_run(run_toml(clean), points_csv(
+        simulate(replace(plan, noise_mm=1e-6))), actuators=6)])  # fmt: skip
+    rng = np.random.default_rng(seed)
+    noise = rng.standard_normal((3, rows.count))
+    for k in range(1, rows.count):
+        noise[:, k] = rho * noise[:, k - 1] + np.sqrt(1.0 - rho**2) * noise[:, k]
+    return replace(rows, position=quiet.position + SIGMA_MM * noise)
+
+
+@pytest.mark.parametrize(
+    ("hidden", "expected"), [({}, ()), ({"backlash.leg3": 0.03}, ("backlash",))]
+)
+def test_correlated_noise_is_named_and_nothing_else_but_what_is_there(hidden, expected):
+    rows = measured(hidden, 0.5, seed=4)
+    found = discover_run(Refitter(rows, catalogue(rows.machine)))
+    last = stage_of(found).run
+    assert found.last.effects == expected
+    assert last.diagnosis.adequate
+    assert "the noise is correlated over" in noise_words(last)
+    assert last.noise.components[0].name == "correlated"
+    assert last.noise.components[0].p_value < 1e-6

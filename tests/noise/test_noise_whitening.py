@@ -1,0 +1,57 @@
+"""Innovations are what a dense Cholesky factor of the covariance would make of the readings."""
+
+import numpy as np
+import pytest
+
+from calib.noise import Noise, Taking, Whitening
+
+READINGS, ACTUATORS = 30, 4
+CASES = [
+    Noise(scale=1.3),
+    Noise(tau_s=20.0),
+    Noise(tau_s=20.0, share=0.6, scale=1.2),
+    Noise(tau_s=20.0, by_row=True),
+    Noise(visit=0.5, scale=0.9),
+    Noise(visit=0.5, tau_s=30.0),
+    Noise(visit=0.5, tau_s=30.0, share=0.5, by_row=True),
+]
+
+
+def taking(rng: np.random.Generator) -> Taking:
+    """Two runs; visits of three readings, base nests among them; in any order."""
+    run = np.repeat([0, 1], READINGS // 2)
+    time = np.concatenate([np.sort(rng.uniform(0, 300, READINGS // 2)) for _ in range(2)])
+    time[4] = time[3]
+    visit = np.repeat(np.arange(READINGS // 3), 3)
+    visit[[0, 10, 17]] = -1
+    mixed = rng.permutation(READINGS)
+    motions = rng.standard_normal((ACTUATORS, 3, READINGS))
+    return Taking(run[mixed], time[mixed], visit[mixed], motions)
+
+
+def covariance(taken: Taking, noise: Noise) -> np.ndarray:
+    """The whole covariance (3 A, 3 A), written out."""
+    alike = np.eye(READINGS)
+    if noise.tau_s:
+        clock = np.zeros(READINGS)
+        gaps = taken.gaps(noise.by_row)
+        clock[taken.order] = np.cumsum(np.where(np.isfinite(gaps), gaps, 0.0))
+        same_run = taken.run[:, None] == taken.run
+        fading = np.exp(-np.abs(clock[:, None] - clock) / noise.tau_s) * same_run
+        alike = noise.share * fading + (1.0 - noise.share) * alike
+    whole = noise.scale**2 * np.einsum("ij,ab->iajb", np.eye(3), alike)
+    together = (taken.visit[:, None] == taken.visit) & (taken.visit >= 0)
+    moved = np.einsum("uia,ujb,ab->iajb", taken.motions, taken.motions, together)
+    return (whole + noise.visit**2 * moved).reshape(3 * READINGS, -1)
+
+
+@pytest.mark.parametrize("noise", CASES, ids=str)
+def test_whitened_columns_have_the_inner_products_of_the_inverse_covariance(noise):
+    rng = np.random.default_rng(1)
+    taken = taking(rng)
+    whole, whitening = covariance(taken, noise), Whitening(taken, noise)
+    columns = rng.standard_normal((5, 3, READINGS))
+    white = whitening.apply(columns).reshape(5, -1)
+    flat = columns.reshape(5, -1)
+    np.testing.assert_allclose(white @ white.T, flat @ np.linalg.solve(whole, flat.T), atol=1e-9)
+    assert whitening.log_det == pytest.approx(np.linalg.slogdet(whole)[1], abs=1e-9)
