@@ -27,15 +27,21 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from calib.errors import BadInput
 from mocks.canopen.bare_site import bare_site
 from mocks.canopen.server import CanopenStation
 from mocks.clock import ScaledClock
 from mocks.control import ControlServer, Hands
 from mocks.gcs.server import GcsStation
 from mocks.hidden.table import Hidden
-from mocks.physics.bodies import BODIES
+from mocks.own_files import OwnFiles, own_files, own_machine
+from mocks.physics.bodies import BODIES, WITH_OWN_FILES
 from mocks.physics.hexapod import HOME_Z
-from mocks.physics.truth import draw_parameters, machine_file, read_parameters
+from mocks.physics.truth import (
+    draw_parameters,
+    machine_file,
+    read_parameters,
+)
 from mocks.tracker.instrument import SERIAL
 from mocks.tracker.lines import LineServer
 from mocks.tracker.server import TrackerServer
@@ -66,16 +72,20 @@ class MockStation:
         lines: bool = False,
         pose: bool = False,
         bare: bool = False,
+        own: OwnFiles | None = None,
     ) -> None:
         self.world = world
         self.clock = clock
         self.pose = pose
+        self.own = own
         self.serial = serial if serial is not None else _serial(nvm)
         host = "127.0.0.1"
         self.controller: CanopenStation | GcsStation = (
             GcsStation(world, nvm, host, ports[0], True, self.serial, pose)
-            if pose or world.machine.name in ON_GCS
-            else CanopenStation(world, nvm, host, ports[0], self.serial, bare)
+            if pose or world.kind in ON_GCS
+            else CanopenStation(
+                world, nvm, host, ports[0], self.serial, bare, own.eds if own else None
+            )
         )
         self.tracker = TrackerServer(world, clock, host, ports[1])
         self.lines = LineServer(world, clock, host) if lines else None
@@ -130,9 +140,10 @@ class MockStation:
             }  # fmt: skip
         if self.controller.controller is None:
             return bare_site(self.world, self.channel, self.controller.serials)
+        eds = {"eds": str(self.own.eds)} if self.own else {}
         return {
             "kind": "canopen", "interface": "slcan", "channel": self.channel,
-            "node": CONTROLLER_NODE,
+            "node": CONTROLLER_NODE, **eds,
         }  # fmt: skip
 
     def _tracker_site(self) -> dict[str, Any]:
@@ -150,7 +161,7 @@ class MockStation:
         plan, around, load = self.world.plan, self.world.around, self.world.load
         return {
             "title": f"mock {self.world.machine.name}, seed {plan.seed}",
-            "machine": self.world.machine.name,
+            "machine": str(self.own.machine) if self.own else self.world.machine.name,
             "controller": {"serial": str(self.serial), **self._controller_site()},
             "tracker": {**self._tracker_site(), "frame": self._rough_frame()},
             "nests": {
@@ -200,7 +211,15 @@ def parser() -> argparse.ArgumentParser:
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("machine", choices=list(BODIES))
+    parser.add_argument(
+        "machine", metavar="MACHINE",
+        help=f"{', '.join(BODIES)}, or a machine file of one's own with the mechanism of "
+        f"{' or '.join(WITH_OWN_FILES)} (with --eds)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--eds", type=Path,
+        help="its controller's EDS file, as pkmcal machine eds writes it",
+    )  # fmt: skip
     parser.add_argument("--seed", type=int, default=1, help="draws truth, room and noise")
     parser.add_argument("--scale", type=float, default=1.0, help="machine s per wall s")
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
@@ -232,7 +251,8 @@ def parser() -> argparse.ArgumentParser:
 
 def build(options: argparse.Namespace) -> MockStation:
     """Make the station that the command line asks for; raises ValueError or OSError."""
-    machine = machine_file(options.machine)
+    own = own_files(options.machine, options.eds, options.bare)
+    machine = own_machine(own) if own else machine_file(options.machine)
     parameters: Mapping[str, float] = (
         read_parameters(options.truth, machine)
         if options.truth is not None
@@ -246,6 +266,7 @@ def build(options: argparse.Namespace) -> MockStation:
         smrs=options.smrs,
         base_smrs=not options.no_base_smrs,
         machine=options.machine,
+        own=machine if own else None,
     )
     clock = ScaledClock(options.scale)
     world = World(clock, plan)
@@ -253,11 +274,12 @@ def build(options: argparse.Namespace) -> MockStation:
     ports = (options.controller_port, options.tracker_port, options.control_port)
     if options.pose and options.machine != "hexapod":
         raise ValueError(f"there is no closed controller (--pose) of the {options.machine}")
-    if options.bare and (options.pose or options.machine in ON_GCS):
+    if options.bare and (options.pose or world.kind in ON_GCS):
         raise ValueError(f"there are no drives alone (--bare) of the {options.machine} on GCS")
     return MockStation(
-        world, clock, options.nvm, ports, options.serial, options.lines, options.pose, options.bare
-    )
+        world, clock, options.nvm, ports, options.serial, options.lines, options.pose,
+        options.bare, own,
+    )  # fmt: skip
 
 
 async def run(options: argparse.Namespace) -> None:
@@ -304,7 +326,7 @@ def main(argv: list[str] | None = None) -> int:
     options = parser().parse_args(argv)
     try:
         asyncio.run(run(options))
-    except ValueError as error:
+    except (ValueError, BadInput) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     except OSError as error:

@@ -9,11 +9,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from calib.mechanism.description import Machine
 from mocks.clock import Clock, ScaledClock
 from mocks.faults import FaultSet
 from mocks.hidden.table import Hidden
 from mocks.physics.actuators import Load, play_widths
-from mocks.physics.bodies import body_named
+from mocks.physics.bodies import body_named, body_of
 from mocks.physics.body import Surroundings
 from mocks.physics.circumstances import Circumstances, Stroke
 from mocks.physics.climate import Climate
@@ -31,9 +32,10 @@ HAND_AWAY = (0.0, 0.0, -1000.0)
 class WorldPlan:
     """How a world is made.
 
-    ``machine`` names the body. ``parameters`` are the true ones (drawn by ``seed`` if None);
-    ``load`` that of the body's surroundings if None. ``smrs``: one SMR, in the
-    birdbath, or three, in the platform's nests. ``base_smrs``: each base nest holds its own.
+    ``machine`` names the body; ``own`` is one's own machine with such a body. ``parameters`` are
+    the true ones (drawn by ``seed`` if None); ``load`` that of the body's surroundings if None.
+    ``smrs``: one SMR, in the birdbath, or three, in the platform's nests. ``base_smrs``: each base
+    nest holds its own.
     """
 
     seed: int = 1
@@ -43,6 +45,7 @@ class WorldPlan:
     smrs: int = 1
     base_smrs: bool = True
     machine: str = "hexapod"
+    own: Machine | None = None
 
 
 class World:
@@ -52,7 +55,7 @@ class World:
         plan = plan or WorldPlan()
         self.clock: Clock = clock or ScaledClock()
         self.plan = plan
-        self.body = body_named(plan.machine)
+        self.body = body_of(plan.own) if plan.own is not None else body_named(plan.machine)
         self.machine, self.around = self.body.machine, self.body.around
         self.load = plan.load or self.around.load
         given = plan.parameters
@@ -73,8 +76,8 @@ class World:
 
     @property
     def kind(self) -> str:
-        """Name of the machine file."""
-        return self.machine.name
+        """Name of the body."""
+        return self.body.kind
 
     @property
     def unit(self) -> str:

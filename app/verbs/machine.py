@@ -22,6 +22,7 @@ from calib.mechanism.solve import Configuration, home_configuration, inverse
 from calib.mechanism.task import task_values
 from calib.poses.verification import verification_poses
 from calib.quantity import quantity
+from mocks.canopen.make_eds import controller_eds
 
 
 @click.group()
@@ -91,6 +92,32 @@ def _configuration(machine: Machine, pose: str) -> Configuration:
     if not found.converged[0]:
         raise BadInput("the machine does not close at this pose", remedy="Choose a pose in reach.")
     return found
+
+
+@command.command()
+@machine_options
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Where it is written.  [default: NAME_controller.eds]",
+)
+@click.option("--force", is_flag=True, help="Overwrite the file.")
+def eds(machine_name: str, closure: str, out: Path | None, force: bool) -> None:
+    """Write the EDS file of a machine's controller on CANopen.
+
+    Its object dictionary follows from the machine file: an entry for each parameter, its default
+    the nominal value, compensation values, motion and limits of every actuator. The site file
+    names it: eds = "NAME_controller.eds" in [controller]. docs/protocols/canopen.md says what
+    each object does.
+    """
+    machine = chosen_machine(machine_name, closure)
+    name, text = controller_eds(machine)
+    path = out or Path(name)
+    if path.exists() and not force:
+        raise BadInput("there is such a file already", place=str(path), remedy="Add --force.")
+    path.write_text(text, encoding="utf-8")
+    answer.say(f"written to {path}")
+    click.echo(f'In [controller] of the site file: kind = "canopen", eds = "{path.name}"')
 
 
 class Asked:

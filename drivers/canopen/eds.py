@@ -1,13 +1,19 @@
 """The EDS files that ship with the program: where they are, and what stands in them."""
 
+import contextlib
+import struct
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
 from canopen import ObjectDictionary, import_od
+from canopen.objectdictionary import ODVariable, datatypes
 
 from drivers.errors import DeviceError
 
 EDS_FOLDER = Path(__file__).resolve().parents[1] / "eds"
+FLOATS = {datatypes.REAL32: ">f", datatypes.REAL64: ">d"}
+"""CiA 306 writes their defaults as IEEE 754 patterns, which the canopen package does not read."""
 
 
 def eds_path(name: str) -> Path:
@@ -17,7 +23,8 @@ def eds_path(name: str) -> Path:
         known = ", ".join(sorted(p.stem for p in EDS_FOLDER.glob("*.eds")))
         raise DeviceError(
             f"no EDS file named {name!r}",
-            remedy=f"Name one of {known}, or a path in the site file.",
+            remedy=f"Those that ship are {known}. Write one of your own machine with pkmcal "
+            "machine eds MACHINE, and name its path in the site file: eds = ... in [controller].",
         )
     return path
 
@@ -35,4 +42,20 @@ def dictionary(path: Path, node_id: int) -> ObjectDictionary:
 
 @lru_cache(maxsize=64)
 def _dictionary(path: str, _changed_ns: int, node_id: int) -> ObjectDictionary:
-    return import_od(path, node_id)
+    objects = import_od(path, node_id)
+    for variable in _variables(objects):
+        pattern = FLOATS.get(variable.data_type or 0)
+        text = getattr(variable, "default_raw", "").strip().lower()
+        if pattern is not None and text.startswith("0x"):
+            with contextlib.suppress(ValueError, OverflowError, struct.error):
+                size = struct.calcsize(pattern)
+                (variable.default,) = struct.unpack(pattern, int(text, 16).to_bytes(size, "big"))
+    return objects
+
+
+def _variables(objects: ObjectDictionary) -> Iterator[ODVariable]:
+    for entry in objects.values():
+        if isinstance(entry, ODVariable):
+            yield entry
+        else:
+            yield from entry.values()

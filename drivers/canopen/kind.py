@@ -2,31 +2,62 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from drivers.errors import Refused
 from drivers.interface import MotionController
 from drivers.kind import Kind, Setting, Surroundings
 
+if TYPE_CHECKING:
+    from drivers.canopen.layout import Layout
+
 
 async def _open(around: Surroundings) -> MotionController:
-    from drivers.canopen.controller import (
-        CanopenController,
-    )  # slow to import: only when it is opened
+    # Slow to import: only when it is opened.
+    from drivers.canopen.controller import CanopenController
+    from drivers.canopen.eds import eds_path
+    from drivers.canopen.layout import read_layout
 
     settings = around.settings
+    eds = Path(settings["eds"]) if settings["eds"] else eds_path(f"{around.machine}_controller")
+    _must_be_of(read_layout(eds, settings["node"]), eds, around)
     return await CanopenController.connect(
         settings["interface"],
         settings["channel"],
         settings["bitrate"] or None,
         machine=around.machine,
         node_id=settings["node"],
-        eds=Path(settings["eds"]) if settings["eds"] else None,
+        eds=eds,
         serial=around.serial or None,
         limits={actuator.name: actuator.limits for actuator in around.actuators},
         heartbeat_s=settings["heartbeat_s"],
         silence_s=settings["silence_s"],
         options=settings["can"],
     )
+
+
+def _must_be_of(layout: "Layout", eds: Path, around: Surroundings) -> None:
+    """Refuse an EDS file that was written for another machine, or for an older file of it."""
+    named = (
+        ("machine", [layout.machine], [around.machine]),
+        ("actuators", list(layout.actuators), [a.name for a in around.actuators]),
+        ("parameters", list(layout.kinematic), list(around.parameters)),
+    )
+    for what, there, wanted in named:
+        if there != wanted:
+            odd = [name for name in there if name not in wanted] or there
+            lacks = [name for name in wanted if name not in there] or wanted
+            raise Refused(
+                f"its {what} are not those of the machine file: it has {_few(odd)}, "
+                f"the machine file {_few(lacks)}",
+                device=str(eds),
+                remedy="Name another EDS file in [controller], or write it anew with pkmcal "
+                "machine eds MACHINE (and set up the controller by it).",
+            )
+
+
+def _few(names: list[str]) -> str:
+    return ", ".join(names[:3]) + (" ..." if len(names) > 3 else "")
 
 
 def known_interface(name: str) -> str:

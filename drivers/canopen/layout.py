@@ -1,5 +1,6 @@
 """What the controller's EDS says about where things are."""
 
+import configparser
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 from canopen import ObjectDictionary
 
 from drivers.canopen.eds import dictionary
+from drivers.errors import DeviceError
 
 KINEMATIC, COMPENSATION = range(0x2100, 0x2200), range(0x2200, 0x2300)
 IDENTITY, MACHINE, CHANNELS = 0x1018, 0x2000, 0x2300
@@ -53,8 +55,19 @@ def named_entries(od: ObjectDictionary, indices: range) -> dict[str, Address]:
 
 
 def read_layout(eds: Path, node_id: int) -> Layout:
-    """Read a controller's EDS file."""
-    od: Any = dictionary(eds, node_id)
+    """Read a controller's EDS file; raises DeviceError for one that is something else."""
+    try:
+        return _layout(dictionary(eds, node_id))
+    except (KeyError, ValueError, TypeError, AttributeError, configparser.Error, OSError) as error:
+        raise DeviceError(
+            f"is no EDS file of a kinematic controller ({type(error).__name__}: {error})",
+            device=str(eds),
+            remedy="Write it with pkmcal machine eds MACHINE; docs/protocols/canopen.md has its "
+            "objects. Drives without such a controller are another kind (pkmcal site kinds).",
+        ) from error
+
+
+def _layout(od: Any) -> Layout:
     return Layout(
         machine=od[MACHINE][1].default,
         product_code=od[IDENTITY][2].default,

@@ -3,13 +3,16 @@
 ``python -m mocks.canopen.describe`` replaces what stands between the marks in the document.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import canopen
+from canopen.objectdictionary import ODVariable
 
-from drivers.canopen.eds import eds_path
+from drivers.canopen.eds import dictionary, eds_path
+from mocks.canopen.eds_text import ARRAY, RECORD, Object
+from mocks.canopen.make_eds import controller_objects, drive_objects
+from mocks.physics.truth import machine_file
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "protocols" / "canopen.md"
 TYPE_NAMES = {
@@ -18,6 +21,7 @@ TYPE_NAMES = {
     0x11: "REAL64",
 }  # fmt: skip
 Row = tuple[str, ...]
+Units = Mapping[tuple[int, int], str]
 
 
 def _table(head: Row, rows: Iterable[Row]) -> str:
@@ -25,16 +29,24 @@ def _table(head: Row, rows: Iterable[Row]) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def _entry(variable: Any) -> Row:
-    kind, access = TYPE_NAMES[variable.data_type], variable.access_type
-    return kind, access, variable.unit or ""
+def _units(objects: Iterable[Object]) -> Units:
+    """The units, which an EDS file has no place for but in comments."""
+    return {
+        (obj.index, sub if obj.code in (ARRAY, RECORD) else 0): entry.unit
+        for obj in objects
+        for sub, entry in enumerate(obj.entries, start=1)
+    }
 
 
-def _rows(od: Any, indices: Iterable[int]) -> list[Row]:
+def _rows(od: Any, indices: Iterable[int], units: Units) -> list[Row]:
+    def _entry(variable: Any) -> Row:
+        unit = units.get((variable.index, variable.subindex), "")
+        return TYPE_NAMES[variable.data_type], variable.access_type, unit
+
     rows: list[Row] = []
     for index in indices:
         entry = od[index]
-        if isinstance(entry, canopen.objectdictionary.ODVariable):
+        if isinstance(entry, ODVariable):
             rows.append((f"0x{index:04X}", "", entry.name, *_entry(entry)))
             continue
         subs = [entry[sub] for sub in range(1, len(entry))]
@@ -58,22 +70,23 @@ def _pdo_rows(od: Any) -> list[Row]:
     return rows
 
 
-def controller_tables(name: str = "hexapod_controller", node: int = 10) -> tuple[str, str]:
-    """Return the tables of objects and of PDOs of a controller."""
-    od: Any = canopen.import_od(str(eds_path(name)), node)
+def controller_tables(machine: str = "hexapod", node: int = 10) -> tuple[str, str]:
+    """Return the tables of objects and of PDOs of a machine's controller."""
+    od: Any = dictionary(eds_path(f"{machine}_controller"), node)
+    units = _units(controller_objects(machine_file(machine)))
     objects = [i for i in sorted(od) if 0x2000 <= i < 0x6000]
     head = ("index", "sub", "name", "type", "access", "unit")
     return (
-        _table(head, _rows(od, objects)),
+        _table(head, _rows(od, objects, units)),
         _table(("direction", "PDO", f"COB-ID (node {node})", "holds"), _pdo_rows(od)),
     )
 
 
 def drive_table() -> str:
     """Return the table of the drive's CiA 402 objects."""
-    od: Any = canopen.import_od(str(eds_path("drive402")), 1)
+    od: Any = dictionary(eds_path("drive402"), 1)
     head = ("index", "sub", "name", "type", "access", "unit")
-    return _table(head, _rows(od, [i for i in sorted(od) if i >= 0x6000]))
+    return _table(head, _rows(od, [i for i in sorted(od) if i >= 0x6000], _units(drive_objects())))
 
 
 def main() -> None:

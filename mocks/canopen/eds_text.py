@@ -1,5 +1,10 @@
-"""EDS files (CiA 306) written from short tables of objects."""
+"""EDS files (CiA 306) written from short tables of objects.
 
+They say what CiA 306 knows and nothing else: a number of a REAL type is written as its IEEE 754
+pattern in hexadecimal, most significant byte first, and a unit stands in a comment.
+"""
+
+import struct
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -59,12 +64,15 @@ def record(index: int, name: str, entries: Sequence[Entry]) -> Object:
 
 def _value(entry: Entry) -> str:
     default = entry.default
+    if entry.kind == "REAL64":
+        return f"0x{struct.pack('>d', float(default or 0.0)).hex().upper()}"
     if isinstance(default, int) and entry.kind in ("U32", "U16") and default > 255:
         return f"0x{default:X}"
-    return repr(default) if isinstance(default, float) else str(default)
+    return str(default)
 
 
 def _section(title: str, entry: Entry) -> list[str]:
+    unit = [f"; in {entry.unit}"] if entry.unit else []
     lines = [
         f"[{title}]",
         f"ParameterName={entry.name}",
@@ -75,9 +83,7 @@ def _section(title: str, entry: Entry) -> list[str]:
     ]
     if entry.default is not None:
         lines.insert(5, f"DefaultValue={_value(entry)}")
-    if entry.unit:
-        lines.append(f"Unit={entry.unit}")
-    return [*lines, ""]
+    return [*lines, *unit, ""]
 
 
 def _object_lines(obj: Object) -> list[str]:

@@ -1,12 +1,14 @@
 """Write the EDS files in ``drivers/eds``: ``python -m mocks.canopen.make_eds``.
 
-The layout of a motion controller follows from the machine file alone (its actuators and the
-nominal values of its parameters), so that another machine is another file, not another program.
+``pkmcal machine eds`` writes the controller's of one's own machine with the same functions. The
+layout of a motion controller follows from the machine file alone (its actuators and the nominal
+values of its parameters), so that another machine is another file, not another program.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from drivers.canopen.eds import EDS_FOLDER
 from mocks.canopen.eds_text import (
@@ -22,6 +24,7 @@ from mocks.canopen.eds_text import (
 from mocks.physics.truth import machine_file
 
 TABLE_POINTS = 32
+MOST_ARRAYS, MOST_ENTRIES = 0xFF, 0xFE
 DRIVE_PRODUCT, CONTROLLER_PRODUCT = 0x402, 0x1000
 
 
@@ -112,12 +115,21 @@ def drive_objects(u: DriveUnits = LINEAR) -> list[Object]:
 
 
 def parameter_objects(machine: Machine) -> list[Object]:
-    """Return the kinematic parameters: one array a limb from 0x2101 on."""
+    """Return the kinematic parameters: one array a limb from 0x2101 on.
+
+    Raises BadInput for a machine with more of them than there are places.
+    """
     limbs: dict[str, list[Entry]] = {}
     for parameter in machine.parameters:
         limb = parameter.name.partition(".")[0]
         entry = Entry(parameter.name, "REAL64", "rw", float(parameter.nominal), parameter.unit)
         limbs.setdefault(limb, []).append(entry)
+    if len(limbs) > MOST_ARRAYS or max(map(len, limbs.values()), default=0) > MOST_ENTRIES:
+        raise BadInput(
+            "the machine has more parameters than the object dictionary has places",
+            place=machine.name,
+            remedy=f"There are {MOST_ARRAYS} limbs of {MOST_ENTRIES} parameters.",
+        )
     return [
         array(0x2101 + n, f"Kinematic parameters {limb}", entries)
         for n, (limb, entries) in enumerate(limbs.items())

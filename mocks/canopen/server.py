@@ -34,6 +34,8 @@ class CanopenStation:
         Serial number of the controller (0x1018:4).
     bare : bool
         Whether there are drives alone, as their maker sells them, and no controller.
+    eds : Path, optional
+        EDS file of the controller, of one's own machine.
     """
 
     def __init__(
@@ -44,6 +46,7 @@ class CanopenStation:
         port: int = 0,
         serial: int = 1001,
         bare: bool = False,
+        eds: Path | None = None,
     ) -> None:
         self._world = world
         self._bus = EndpointBus(self._silent)
@@ -55,7 +58,13 @@ class CanopenStation:
             else [Drive(n, drive_eds_path(world.kind), world) for n in numbers]
         )
         self.drives = drives
-        self.controller = None if bare else _controller(world, drives, nvm_path, serial)
+        self.controller = (
+            None
+            if bare
+            else _controller(
+                world, drives, nvm_path, serial, eds or eds_path(f"{world.kind}_controller")
+            )
+        )
         self.nodes: list[StationNode] = [*drives, *([self.controller] if self.controller else [])]
         self.serials = [10 * serial + number for number in numbers]
         for number, drive in enumerate(self.drives, start=1):
@@ -139,9 +148,8 @@ class CanopenStation:
 
 
 def _controller(
-    world: Machine, drives: list[Drive], nvm_path: Path | None, serial: int
+    world: Machine, drives: list[Drive], nvm_path: Path | None, serial: int, eds: Path
 ) -> Controller:
-    eds = eds_path(f"{world.kind}_controller")
     controller = Controller(CONTROLLER_NODE, eds, world, drives, nvm_path)
     controller.readers[0x1018, 4] = lambda: serial
     return controller

@@ -55,6 +55,8 @@ class Body(Protocol):
 
     Attributes
     ----------
+    kind : str
+        Name of the shipped machine file whose mechanism it has.
     machine : Machine
         Its machine file.
     limbs : tuple of str
@@ -64,6 +66,7 @@ class Body(Protocol):
     around : Surroundings
     """
 
+    kind: str
     machine: Machine
     limbs: tuple[str, ...]
     stroke: Stroke

@@ -62,6 +62,8 @@ class RealHexapod:
 class HexapodBody:
     """Six legs between offset universal joints (Han et al. 2020)."""
 
+    kind = "hexapod"
+
     def __init__(self) -> None:
         self.machine = machine_file("hexapod")
         self.limbs = LIMBS

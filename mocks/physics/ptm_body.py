@@ -83,6 +83,8 @@ class RealPtm:
 class PtmBody:
     """Two motors, four RSR limbs and one SS limb (Zhang et al. 2018)."""
 
+    kind = "ptm"
+
     def __init__(self) -> None:
         self.machine = machine_file("ptm")
         self.limbs = LIMBS

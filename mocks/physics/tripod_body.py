@@ -74,6 +74,8 @@ class RealTripod:
 class TripodBody:
     """Three sliders and three parallelograms (Feng et al. 2022)."""
 
+    kind = "tripod"
+
     def __init__(self) -> None:
         self.machine = machine_file("tripod")
         self.limbs = LIMBS

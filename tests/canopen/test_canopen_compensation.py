@@ -3,12 +3,11 @@
 import math
 from pathlib import Path
 
-import canopen
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.canopen.eds import eds_path
+from drivers.canopen.eds import dictionary, eds_path
 from mocks.canopen.compensation import Compensation, direction_of
 from mocks.canopen.parameters import ParameterSet, acceptable
 
@@ -78,7 +77,7 @@ def test_values_are_accepted_within_reason(name: str, value: float, good: bool):
 
 
 def parameters(nvm: Path) -> ParameterSet:
-    return ParameterSet(canopen.import_od(str(eds_path("hexapod_controller")), 10), nvm)
+    return ParameterSet(dictionary(eds_path("hexapod_controller"), 10), nvm)
 
 
 def test_stored_set_survives_in_its_file(tmp_path: Path):
