@@ -46,13 +46,8 @@ def robust_align(base: Array, tracker: Array, slack: Array) -> tuple[Array, Arra
     inside = misfit(base, tracker, rotation, position) < slack
     if inside.all():
         return rotation, position, inside
-    generator = np.random.default_rng(0)  # the same triples every time: a fit is a pure function
     best = inside
-    for _ in range(TRIPLES):
-        three = generator.choice(base.shape[1], 3, replace=False)
-        if collinear(base[:, three]):
-            continue
-        trial = misfit(base, tracker, *align(base[:, three], tracker[:, three])) < slack
+    for trial in _trials(base, tracker, slack):
         if trial.sum() > best.sum():
             best = trial
     for _ in range(5):
@@ -64,6 +59,23 @@ def robust_align(base: Array, tracker: Array, slack: Array) -> tuple[Array, Arra
             break
         best = again
     return rotation, position, best
+
+
+def _trials(base: Array, tracker: Array, slack: Array) -> BoolArray:
+    """Readings (T, N) inside after aligning each of T random triples that are on no line."""
+    generator = np.random.default_rng(0)  # the same triples every time: a fit is a pure function
+    count = base.shape[1]
+    three = np.array([generator.choice(count, 3, replace=False) for _ in range(TRIPLES)])
+    points, seen = np.moveaxis(base[:, three], 0, 1), np.moveaxis(tracker[:, three], 0, 1)
+    centre, seen_centre = points.mean(axis=2), seen.mean(axis=2)
+    points = points - centre[:, :, None]
+    spread = np.linalg.svd(points, compute_uv=False)
+    plane = (spread[:, 1] >= 1e-3 * spread[:, 0]) & (spread[:, 0] > 0.0)
+    u, _, vt = np.linalg.svd((seen - seen_centre[:, :, None]) @ np.swapaxes(points, 1, 2))
+    u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
+    rotation = u @ vt
+    apart = tracker - rotation @ (base - centre[:, :, None]) - seen_centre[:, :, None]
+    return np.asarray(np.sum(apart * apart, axis=1)[plane] < slack**2)
 
 
 def moved_together(base: Array, tracker: Array, slack: Array) -> BoolArray:

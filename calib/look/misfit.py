@@ -25,6 +25,7 @@ from calib.mechanism.rigid import rotate
 from calib.runs.record import Run
 from calib.runs.remark import Remark, ranges
 from calib.runs.stack import stack
+from calib.scaled import Scaled, normal_matrix
 
 LOUD = 2.0
 """Chi-square per degree of freedom from which on the record itself is in question."""
@@ -40,8 +41,10 @@ LEAST = 3
 """Readings on either side of a step."""
 SMALLEST_SEAT = 0.1
 """Offset of a nest, mm, below which it is a matter of the effect nest-offset."""
-UNIT = (1.0 / 3000.0, 1.0 / 300.0)
-"""Scatter over stated sigmas that says um were written for mm."""
+TOO_QUIET = 0.3
+"""Scatter over stated sigmas below which these may be another unit."""
+LOUDEST = 100.0
+"""Chi-square per degree of freedom that physics may leave where the unit is right."""
 ABSURD_MM = 0.3
 """Stated sigma, mm, that no laser tracker has."""
 _Known = Mapping[str, Array]
@@ -64,10 +67,15 @@ def look_at_misfit(
     fitted = _fit(machine, run, known)
     if fitted is None or not fitted.dof > 0:
         return [run], [], {}
+    if len(fitted.bad) > LEAST:
+        fitted = _with_the_excluded(fitted)
     scatter = float(np.sqrt(fitted.chi2_per_dof))
     sigma = float(np.median(np.sqrt(np.einsum("iin->in", fitted.model.rows.covariance))))
-    if UNIT[0] < scatter < UNIT[1] and sigma > ABSURD_MM:
-        return _in_um(run, sigma, scatter)
+    if scatter < TOO_QUIET and sigma > ABSURD_MM:
+        in_um = replace(run, covariance=1e-6 * run.covariance)
+        again = _fit(machine, in_um, known)
+        if again is not None and again.chi2_per_dof < LOUDEST:
+            return [in_um], [_in_um(run, sigma, scatter)], {}
     if fitted.chi2_per_dof < LOUD or known:
         return [run], [], {}
     found = _step(fitted) if alone else None
@@ -87,8 +95,27 @@ def _fit(machine: Machine, run: Run, known: _Known) -> Fit | None:
         return None  # the fit that was asked for says it
 
 
-def _in_um(run: Run, sigma: float, scatter: float) -> tuple[list[Run], list[Remark], _Known]:
-    remark = Remark(
+def _with_the_excluded(fitted: Fit) -> Fit:
+    """The fit as it would be of all readings, to first order: a step passes for so many strays."""
+    accepted = fitted.model.usable.copy()
+    precision = fitted.prior_precision
+    jacobian, whitened = fitted.linear.jacobian, fitted.linear.whitened
+    flat = jacobian[:, :, accepted].reshape(precision.size, -1)
+    covariance = Scaled.of(normal_matrix(flat, precision)).inverse()
+    slope = flat @ whitened[:, accepted].reshape(-1)
+    slope -= precision * fitted.model.deviation(fitted.linear.state)
+    left = whitened - np.tensordot(covariance @ slope, jacobian, axes=1)
+    return replace(
+        fitted,
+        linear=replace(fitted.linear, whitened=left),
+        accepted=accepted,
+        bad=(),
+        step_covariance=covariance,
+    )
+
+
+def _in_um(run: Run, sigma: float, scatter: float) -> Remark:
+    return Remark(
         "sigma-in-um",
         f"sx, sy, sz look like um: {sigma:.3g} means {sigma:.3g} mm",
         (),
@@ -98,7 +125,6 @@ def _in_um(run: Run, sigma: float, scatter: float) -> tuple[list[Run], list[Rema
         True,
         run.source,
     )
-    return [replace(run, covariance=1e-6 * run.covariance)], [remark], {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,7 +244,8 @@ def _seat(fitted: Fit) -> _Seat | None:
     kept = np.flatnonzero(fitted.accepted)
     best: _Seat | None = None
     for name in header.platform_nests:
-        own = (names == name) & fitted.accepted
+        named = names == name
+        own = named & fitted.accepted
         at = np.flatnonzero(own[kept])
         if at.size <= LEAST:
             continue
@@ -227,8 +254,13 @@ def _seat(fitted: Fit) -> _Seat | None:
             tried = at[LEAST:] if early else at[: at.size - LEAST]
             scan = _scan(fitted, _seat_columns(fitted, own, room=room), early=early)
             edge = int(tried[np.argmax(scan.fall[tried])])
-            which = own & ((np.arange(own.size) <= kept[edge]) == early)
+            whole = int(at[-1] if early else at[0])
+            if scan.fall[whole] > scan.fall[edge] - CLEAR:
+                edge = whole
+            which = named & ((np.arange(own.size) <= kept[edge]) == early)
             which[kept[edge]] = True
+            if edge == whole:
+                which = named
             size = float(np.linalg.norm(scan.sizes[edge]))
             if size < SMALLEST_SEAT or abs(normal @ scan.sizes[edge]) < ALONG * size:
                 continue

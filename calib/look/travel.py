@@ -11,6 +11,8 @@ OUTSIDE = 0.5
 """Part of the rows outside the travel from which on the columns are not what they should be."""
 WIDER = 0.1
 """Part of the travel by which commands may pass a limit of the file."""
+LEAST_TRAVEL = 0.02
+"""Part of the travel that a run at least uses: where it is less, any small number would do."""
 _LENGTHS = ((1000.0, "m"), (25.4, "inches"), (0.001, "um"), (10.0, "cm"))
 _ANGLES = ((np.pi / 180.0, "degrees"), (0.001, "mrad"), (2.0 * np.pi, "turns"))
 
@@ -45,7 +47,11 @@ def _explained(machine: Machine, q: Array) -> str:
     """The first reading of the numbers that brings almost all of them into the travel."""
     units = [actuator.unit for actuator in machine.actuators]
     home = machine.home_q[:, None]
-    tried: list[tuple[Array, str]] = []
+    tried: list[tuple[Array, str]] = [
+        (home + q, "changes from home, not positions"),
+        (-q, "positions of the wrong sign"),
+        (home - q, "changes from home of the wrong sign"),
+    ]
     for factors, of in ((_LENGTHS, "mm"), (_ANGLES, "rad")):
         if of not in units:
             continue
@@ -53,13 +59,9 @@ def _explained(machine: Machine, q: Array) -> str:
             scale = np.array([factor if unit == of else 1.0 for unit in units])[:, None]
             tried.append((scale * q, name))
             tried.append((home + scale * q, f"changes from home in {name}"))
-    tried += [
-        (home + q, "changes from home, not positions"),
-        (-q, "positions of the wrong sign"),
-        (home - q, "changes from home of the wrong sign"),
-    ]
     for values, name in tried:
-        if _inside(machine, values).mean() >= 0.95 and np.ptp(values) > 0:
+        wide = np.max(np.ptp(values, axis=1) / np.ptp(machine.q_limits, axis=1)) > LEAST_TRAVEL
+        if wide and _inside(machine, values).mean() >= 0.95:
             return name
     if _inside(machine, q[::-1]).mean() >= 0.95:
         return "the actuators in reversed order"
