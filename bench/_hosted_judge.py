@@ -26,13 +26,15 @@ class Judged:
     ``expected_rms`` and ``peak_99``: RMS and 99 % quantile of the peak over the same poses, from
     the readings' covariances and that of what was identified; ``likely`` the part of such
     verifications whose RMS is at most ``LIMIT`` times that: errors of one machine and of one base
-    frame are common to all poses and do not average out.
+    frame are common to all poses and do not average out. ``fit_rms`` is the RMS of the truth by
+    the covariance of the fit alone.
     """
 
     seen_um: Array
     expected_rms: float
     peak_99: float
     likely: float
+    fit_rms: float
 
     @property
     def rms(self) -> float:
@@ -93,7 +95,8 @@ def judge(run: Run, wanted: Poses, identified: Identified, fit: Fit, q: Array, h
         peaks = np.maximum(peaks, norm)
     expected = float(np.sqrt(np.mean(squares) / wanted.count))
     likely = float(np.mean(np.sqrt(squares / wanted.count) <= LIMIT * expected))
-    return Judged(np.array(seen), expected, float(np.quantile(peaks, 0.99)), likely)
+    fit_rms = 1e3 * float(np.sqrt(np.mean(np.sum(moved**2, axis=0))))
+    return Judged(np.array(seen), expected, float(np.quantile(peaks, 0.99)), likely, fit_rms)
 
 
 def _by_parameters(

@@ -108,14 +108,16 @@ def job(lab: Lab, seed: int, say: Callable[[str], None]) -> list[Judged]:
     for number, (payload, temperature) in enumerate(CONDITIONS):
         wanted = poses_of(FRESH, 100 * seed + 50 + number)
         with lab.station(payload, temperature) as station:
-            session = station.verify(wanted).session
-        run = read_run(Path(session) / "run").run
+            seen = station.verify(wanted, truth=True)
+        run = read_run(Path(seen.session) / "run").run
+        assert seen.truth is not None
         answers.append(_judged(found._fit, run, wanted, seed))
         one = answers[-1]
         say(
             f"{payload:g} kg {temperature} deg C: RMS {one.rms:.2f} um, expected "
             f"{one.expected_rms:.2f}, ratio {one.ratio:.3f}, peak {one.peak:.2f}, "
-            f"99 % {one.peak_99:.2f}"
+            f"99 % {one.peak_99:.2f}; in truth {seen.truth.position_rms_um:.2f}, by the fit's "
+            f"covariance {one.fit_rms:.2f}"
         )
     return answers
 

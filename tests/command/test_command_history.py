@@ -42,7 +42,7 @@ def there_and_back(name, generator, shares=LARGE):
     return one[:, None] + (other - one)[:, None] * share, around(generator, share.size)
 
 
-@pytest.mark.parametrize("name", ["hexapod", "tripod", "ptm", "arm"])
+@pytest.mark.parametrize("name", ["hexapod", "arm"])
 def test_command_of_a_sequence_is_the_commands_one_by_one(name):
     machine, generator = machine_of(name), np.random.default_rng(5)
     identified = remembering(machine, generator)
