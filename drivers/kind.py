@@ -95,6 +95,26 @@ class ActuatorFacts:
 
 
 @dataclass(frozen=True)
+class Strut:
+    """A leg that is a screw without a guide, between two universal joints.
+
+    Attributes
+    ----------
+    limb : str
+    base_normal, platform_normal : tuple of float
+        Unit vectors of the first axes of its joints, base and platform frame.
+    home_turn : float
+        Turn about the strut, right-handed from base to platform, from the second axis of the base
+        joint to that of the platform joint, in the drawing at home; rad.
+    """
+
+    limb: str
+    base_normal: tuple[float, float, float]
+    platform_normal: tuple[float, float, float]
+    home_turn: float
+
+
+@dataclass(frozen=True)
 class Surroundings:
     """What a driver is told when it is opened.
 
@@ -114,6 +134,8 @@ class Surroundings:
         Machine seconds per wall second; 1 but with a mock.
     description : object
         The machine as the program has read it, for kinds whose host computes the motion.
+    struts : tuple of Strut
+        Where every limb is one, in the order of the limbs; else empty.
     """
 
     settings: Mapping[str, Any]
@@ -123,6 +145,7 @@ class Surroundings:
     parameters: Mapping[str, float]
     time_scale: float = 1.0
     description: object = None
+    struts: tuple[Strut, ...] = ()
 
 
 DeviceT = TypeVar("DeviceT", MotionController, Motors, PoseMover, Tracker)

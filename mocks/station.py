@@ -34,6 +34,9 @@ from mocks.clock import ScaledClock
 from mocks.control import ControlServer, Hands
 from mocks.gcs.server import GcsStation
 from mocks.hidden.table import Hidden
+from mocks.linuxcnc.body import StrutsBody
+from mocks.linuxcnc.server import LinuxCncStation
+from mocks.linuxcnc.site import linuxcnc_site
 from mocks.own_files import OwnFiles, own_files, own_machine
 from mocks.physics.bodies import BODIES, WITH_OWN_FILES
 from mocks.physics.hexapod import HOME_Z
@@ -73,6 +76,7 @@ class MockStation:
         pose: bool = False,
         bare: bool = False,
         own: OwnFiles | None = None,
+        linuxcnc: Path | None = None,
     ) -> None:
         self.world = world
         self.clock = clock
@@ -80,8 +84,10 @@ class MockStation:
         self.own = own
         self.serial = serial if serial is not None else _serial(nvm)
         host = "127.0.0.1"
-        self.controller: CanopenStation | GcsStation = (
-            GcsStation(world, nvm, host, ports[0], True, self.serial, pose)
+        self.controller: CanopenStation | GcsStation | LinuxCncStation = (
+            LinuxCncStation(world, linuxcnc, self.serial)
+            if linuxcnc is not None
+            else GcsStation(world, nvm, host, ports[0], True, self.serial, pose)
             if pose or world.kind in ON_GCS
             else CanopenStation(
                 world, nvm, host, ports[0], self.serial, bare, own.eds if own else None
@@ -130,6 +136,8 @@ class MockStation:
         """Where the controller can be reached."""
         if isinstance(self.controller, GcsStation):
             return {"gcs": self.channel, "serial_port": self.controller.pty_path}
+        if isinstance(self.controller, LinuxCncStation):
+            return {"ini": self.controller.address[0]}
         return {"can": self.channel}
 
     def _controller_site(self) -> dict[str, Any]:
@@ -138,6 +146,8 @@ class MockStation:
             return {"kind": "pose", "port": port, **POSE_SITE} if self.pose else {
                 "kind": "gcs", "port": port,
             }  # fmt: skip
+        if isinstance(self.controller, LinuxCncStation):
+            return linuxcnc_site(self.controller.program)
         if self.controller.controller is None:
             return bare_site(self.world, self.channel, self.controller.serials)
         eds = {"eds": str(self.own.eds)} if self.own else {}
@@ -241,6 +251,10 @@ def parser() -> argparse.ArgumentParser:
         "--bare", action="store_true",
         help="CiA 402 drives alone, without a controller (kind drives)",
     )  # fmt: skip
+    parser.add_argument(
+        "--linuxcnc", type=Path, metavar="FOLDER",
+        help="hexapod: LinuxCNC itself, which must be installed, with its files in FOLDER",
+    )  # fmt: skip
     parser.add_argument("--payload", type=float, default=0.0, help="kg")
     for name in ("controller", "tracker", "control"):
         parser.add_argument(f"--{name}-port", type=int, default=0)
@@ -252,7 +266,8 @@ def parser() -> argparse.ArgumentParser:
 def build(options: argparse.Namespace) -> MockStation:
     """Make the station that the command line asks for; raises ValueError or OSError."""
     own = own_files(options.machine, options.eds, options.bare)
-    machine = own_machine(own) if own else machine_file(options.machine)
+    body = StrutsBody() if options.linuxcnc is not None else None
+    machine = body.machine if body else own_machine(own) if own else machine_file(options.machine)
     parameters: Mapping[str, float] = (
         read_parameters(options.truth, machine)
         if options.truth is not None
@@ -267,6 +282,7 @@ def build(options: argparse.Namespace) -> MockStation:
         base_smrs=not options.no_base_smrs,
         machine=options.machine,
         own=machine if own else None,
+        body=body,
     )
     clock = ScaledClock(options.scale)
     world = World(clock, plan)
@@ -276,9 +292,13 @@ def build(options: argparse.Namespace) -> MockStation:
         raise ValueError(f"there is no closed controller (--pose) of the {options.machine}")
     if options.bare and (options.pose or world.kind in ON_GCS):
         raise ValueError(f"there are no drives alone (--bare) of the {options.machine} on GCS")
+    if options.linuxcnc is not None and (
+        options.bare or options.pose or options.machine != "hexapod"
+    ):
+        raise ValueError("LinuxCNC (--linuxcnc) moves a hexapod, and holds its parameters itself")
     return MockStation(
         world, clock, options.nvm, ports, options.serial, options.lines, options.pose,
-        options.bare, own,
+        options.bare, own, options.linuxcnc,
     )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from mocks.faults import FaultSet
 from mocks.hidden.table import Hidden
 from mocks.physics.actuators import Load, play_widths
 from mocks.physics.bodies import body_named, body_of
-from mocks.physics.body import Surroundings
+from mocks.physics.body import Body, Surroundings
 from mocks.physics.circumstances import Circumstances, Stroke
 from mocks.physics.climate import Climate
 from mocks.physics.motion import LegMotion
@@ -32,10 +32,10 @@ HAND_AWAY = (0.0, 0.0, -1000.0)
 class WorldPlan:
     """How a world is made.
 
-    ``machine`` names the body; ``own`` is one's own machine with such a body. ``parameters`` are
-    the true ones (drawn by ``seed`` if None); ``load`` that of the body's surroundings if None.
-    ``smrs``: one SMR, in the birdbath, or three, in the platform's nests. ``base_smrs``: each base
-    nest holds its own.
+    ``machine`` names the body; ``own`` is one's own machine with such a body; ``body`` is a body
+    itself. ``parameters`` are the true ones (drawn by ``seed`` if None); ``load`` that of the
+    body's surroundings if None. ``smrs``: one SMR, in the birdbath, or three, in the platform's
+    nests. ``base_smrs``: each base nest holds its own.
     """
 
     seed: int = 1
@@ -46,6 +46,7 @@ class WorldPlan:
     base_smrs: bool = True
     machine: str = "hexapod"
     own: Machine | None = None
+    body: Body | None = None
 
 
 class World:
@@ -55,7 +56,8 @@ class World:
         plan = plan or WorldPlan()
         self.clock: Clock = clock or ScaledClock()
         self.plan = plan
-        self.body = body_of(plan.own) if plan.own is not None else body_named(plan.machine)
+        named = body_of(plan.own) if plan.own is not None else body_named(plan.machine)
+        self.body = plan.body or named
         self.machine, self.around = self.body.machine, self.body.around
         self.load = plan.load or self.around.load
         given = plan.parameters

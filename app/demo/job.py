@@ -1,7 +1,7 @@
 """The seven steps of the job, each with the functions that its verb uses."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -71,10 +71,23 @@ class Demo:
     seed : int
         Seed of the choice of poses.
     watcher : Watcher
+    every : int
+        Of the verification poses each so-manieth is gone to.
+    add : sequence of str
+        Effects in the model.
     """
 
-    def __init__(self, folder: Path, count: int, seed: int, watcher: Watcher) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        count: int,
+        seed: int,
+        watcher: Watcher,
+        every: int = 1,
+        add: Sequence[str] = (),
+    ) -> None:
         self.folder, self.count, self.seed, self.watcher = folder, count, seed, watcher
+        self.every, self.add = every, tuple(add)
         self.running: Session | WriteBack | None = None
 
     async def stop(self) -> None:
@@ -114,7 +127,7 @@ class Demo:
 
     async def _verify(self, site: Site, step: str) -> Verification:
         self.watcher.begins(step)
-        poses = verification_poses(site.machine).by_label
+        poses = dict(list(verification_poses(site.machine).by_label.items())[:: self.every])
         plan = verification_plan(site, poses, truth=True)
         session = Session.create(site, plan, self.folder / "sessions", unattended=True)
         await self._session(step, session)
@@ -165,7 +178,7 @@ class Demo:
 
     def _fit(self, run_folder: Path) -> Path:
         self.watcher.begins("fit")
-        found = fit(Model(load_rows((str(run_folder),))[0]))
+        found = fit(Model(*load_rows((str(run_folder),), self.add)))
         path = self.folder / "model.toml"
         write_model(path, found)
         self.watcher.ends(

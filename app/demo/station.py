@@ -12,7 +12,7 @@ from typing import Any
 from app.again import command_of
 from drivers.errors import ConnectFailed
 
-START_DEADLINE_S = 30.0
+START_DEADLINE_S, TURN_DEADLINE_S = 30.0, 360.0
 END_DEADLINE_S = 10.0
 
 
@@ -27,24 +27,28 @@ def mock_station(
     Raises
     ------
     ConnectFailed
-        If it does not say its addresses within :data:`START_DEADLINE_S`.
+        If it does not say its addresses within :data:`START_DEADLINE_S`; LinuxCNC may have to
+        wait for its turn, :data:`TURN_DEADLINE_S`.
     """
     site, complaints = folder / "site.toml", folder / "station.log"
     command = command_of("mock", machine, "--json", "--until-stdin-closes")
     command += ["--seed", str(seed), "--scale", str(scale), "--smrs", "3"]
     command += ["--site", str(site), "--nvm", str(folder / "controller-memory.json"), *arguments]
+    deadline_s = TURN_DEADLINE_S if "--linuxcnc" in arguments else START_DEADLINE_S
     with complaints.open("w", encoding="utf-8") as log:
         station = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True
         )
         try:
-            _first_answer(station, complaints)
+            _first_answer(station, complaints, deadline_s)
             yield site
         finally:
             _end(station)
 
 
-def _first_answer(station: subprocess.Popen[str], complaints: Path) -> dict[str, Any]:
+def _first_answer(
+    station: subprocess.Popen[str], complaints: Path, deadline_s: float
+) -> dict[str, Any]:
     """The line with the addresses; read beside, since a pipe has no deadline of its own."""
     lines: queue.Queue[str] = queue.Queue()
 
@@ -54,7 +58,7 @@ def _first_answer(station: subprocess.Popen[str], complaints: Path) -> dict[str,
 
     threading.Thread(target=read, daemon=True).start()
     try:
-        answer: dict[str, Any] = json.loads(lines.get(timeout=START_DEADLINE_S))
+        answer: dict[str, Any] = json.loads(lines.get(timeout=deadline_s))
     except (queue.Empty, json.JSONDecodeError):
         said = complaints.read_text(encoding="utf-8").strip().splitlines()
         raise ConnectFailed(

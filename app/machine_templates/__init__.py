@@ -7,6 +7,7 @@ from app.machine_templates.arm import arm_file
 from app.machine_templates.common import Questions
 from app.machine_templates.delta import delta_file
 from app.machine_templates.hexapod import hexapod_file
+from app.machine_templates.linuxcnc import linuxcnc_file
 from app.machine_templates.own import own_file
 
 
@@ -23,6 +24,7 @@ TEMPLATES: Sequence[Template] = (
     Template("hexapod", "six legs that grow (6-UPS, a Stewart platform)", hexapod_file),
     Template("delta", "three carriages on towers with two rods each", delta_file),
     Template("arm", "a serial arm with six axes", arm_file),
+    Template("linuxcnc", "six struts as LinuxCNC's genhexkins has them", linuxcnc_file),
     Template("own", "equal limbs around a circle, with joints of your own", own_file),
 )
 

@@ -9,8 +9,9 @@ from app.files.site import Site
 from app.hosted.controller import HostedController
 from app.hosted.means import ByMotors, ByPoses
 from app.hosted.store import HostStore, usual_folder
+from calib.effects.struts import struts_of
 from drivers.interface import MotionController, Motors, PoseMover, Tracker
-from drivers.kind import ActuatorFacts, Surroundings
+from drivers.kind import ActuatorFacts, Strut, Surroundings
 
 
 async def open_controller(site: Site) -> MotionController:
@@ -71,4 +72,5 @@ def _around(site: Site, role: str) -> Surroundings:
         parameters={parameter.name: parameter.nominal for parameter in machine.parameters},
         time_scale=site.clock_scale,
         description=machine,
+        struts=tuple(Strut(**vars(strut)) for strut in struts_of(machine)),
     )

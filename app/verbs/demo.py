@@ -4,6 +4,7 @@ The mock is a process of its own, reached over slcan and the tracker's TCP proto
 """
 
 import asyncio
+import json
 import time
 from datetime import datetime
 from pathlib import Path
@@ -18,7 +19,9 @@ from app.demo.screen import DemoScreen, result_lines
 from app.demo.station import mock_station
 from app.errors import StoppedByOperator
 
-HEAD = ("216 poses", "peak um", "std um", "peak deg", "std deg")
+COLUMNS = ("peak um", "std um", "peak deg", "std deg")
+REAL_TIME_EVERY, REAL = 6, 100.0
+"""With a controller that moves in real time: poses to verify, machine seconds in a second."""
 
 
 @click.command()
@@ -49,29 +52,57 @@ HEAD = ("216 poses", "peak um", "std um", "peak deg", "std deg")
     flag_value="--pose",
     help="A closed controller that takes poses: the host corrects them.",
 )
+@click.option(
+    "--linuxcnc",
+    "device",
+    flag_value="--linuxcnc",
+    help="LinuxCNC itself, installed on this computer, moves simulated motors.",
+)
+@click.option(
+    "--lead",
+    default=0.0,
+    help="Lead of the mock's screws, mm, if they have no guide; screw-twist is then in the model.",
+)
 @answer.json_option
 def command(
-    seed: int, count: int, scale: float, out: Path | None, device: str | None, as_json: bool
+    seed: int,
+    count: int,
+    scale: float,
+    out: Path | None,
+    device: str | None,
+    lead: float,
+    as_json: bool,
 ) -> None:
     """Calibrate a mock hexapod without a person, and write a report.
 
     Verifies 216 poses, measures the chosen ones with a laser tracker over TCP, identifies 54
     parameters, writes them to the motion controller over CAN, and verifies again. With
     --pose the parameters stay here, in a host store, and every command is computed with them.
+    With --linuxcnc 42 parameters go into LinuxCNC's HAL pins and files; it moves in real time, so
+    every sixth pose is verified, and a second holds 100 at most.
     """
     folder = out or Path("out") / f"demo-{datetime.now():%Y%m%d-%H%M%S}"
     folder.mkdir(parents=True, exist_ok=True)
     folder = folder.resolve()
     screen = DemoScreen(Console(stderr=True, highlight=False, quiet=as_json))
     began = time.monotonic()
-    more = [device] if device else []
+    more, every = [device] if device else [], 1
+    if device == "--linuxcnc":
+        more, every, scale = [device, str(folder / "linuxcnc")], REAL_TIME_EVERY, min(scale, REAL)
+    add = []
+    if lead:
+        hidden = folder / "hidden.json"
+        hidden.write_text(json.dumps({"screw-twist.L": lead}), encoding="utf-8")
+        more, add = [*more, "--hidden", str(hidden)], ["screw-twist"]
     with screen.shown(), mock_station("hexapod", seed, scale, folder, more) as site_file:
-        outcome = asyncio.run(_run(Demo(folder, count, seed, screen.watcher), site_file))
+        demo = Demo(folder, count, seed, screen.watcher, every, add)
+        outcome = asyncio.run(_run(demo, site_file))
     rows = result_lines(outcome)
+    head = (f"{len(outcome.after.labels)} poses", *COLUMNS)
     answer.show(
         _json(outcome, time.monotonic() - began),
         as_json,
-        f"{answer.table(HEAD, rows)}\n\nreport: {outcome.report}",
+        f"{answer.table(head, rows)}\n\nreport: {outcome.report}",
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from mocks.hidden.table import Hidden
 from mocks.physics.actuators import Load
-from mocks.physics.body import Place, Surroundings
+from mocks.physics.body import Place, Surroundings, TrueMachine
 from mocks.physics.circumstances import MILLIMETRES, Circumstances
 from mocks.physics.hexapod import (
     HexapodGeometry,
@@ -81,7 +81,7 @@ class HexapodBody:
 
     def real(
         self, parameters: Mapping[str, float], hidden: Hidden, load: Load, settles: bool
-    ) -> RealHexapod:
+    ) -> TrueMachine:
         """A hexapod with these true parameters."""
         hidden.check("hexapod", LIMBS)
         return RealHexapod(true_geometry(parameters, hidden), LegErrors(hidden, load, settles))

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from app.files.machines import load_machine
+from calib.effects.struts import struts_of
 from drivers.canopen import CanopenController
 from drivers.contract import ControllerBench, MotorsBench, PoseBench, TrackerBench
 from drivers.drives.kind import KIND as DRIVES
@@ -15,11 +16,15 @@ from drivers.emscon.settings import EmsconSettings
 from drivers.gcs import GcsController
 from drivers.gcs.pose_kind import KIND as POSE
 from drivers.interface import MotionController, Motors, PoseMover, Tracker
-from drivers.kind import ActuatorFacts, Surroundings
+from drivers.kind import ActuatorFacts, Strut, Surroundings
+from drivers.linuxcnc.kind import KIND as LINUXCNC
 from mocks.canopen.bare_site import bare_site
 from mocks.canopen.server import CanopenStation
 from mocks.clock import ScaledClock
 from mocks.gcs.server import GcsStation
+from mocks.linuxcnc.body import StrutsBody
+from mocks.linuxcnc.server import LinuxCncStation
+from mocks.linuxcnc.site import linuxcnc_site
 from mocks.tracker.server import TrackerServer
 from mocks.world import World, WorldPlan
 
@@ -158,6 +163,40 @@ async def motors_bench(mode: str = "profile") -> AsyncIterator[MotorsBench]:
             unreachable=(*home[:-1], facts[-1].limits[1] + 1.0),
             silence=silence,
             stall=stall,
+        )
+    finally:
+        station.stop()
+
+
+@contextlib.asynccontextmanager
+async def linuxcnc_bench(folder: Path) -> AsyncIterator[ControllerBench]:
+    """LinuxCNC itself, at a speed at which the way between the poses takes a second or two."""
+    world = World(ScaledClock(1.0), WorldPlan(seed=4, body=StrutsBody()))
+    station = LinuxCncStation(world, folder, 4711)
+    facts = tuple(ActuatorFacts(a.name, a.unit, a.home, a.limits) for a in world.machine.actuators)
+    struts = tuple(Strut(**vars(strut)) for strut in struts_of(world.machine))
+    nominal = {p.name: p.nominal for p in world.machine.parameters}
+
+    async def connect() -> MotionController:
+        stated = {**linuxcnc_site(station.program), "speed_mm_s": 8.0}
+        settings = {one.name: stated.get(one.name, one.default) for one in LINUXCNC.settings}
+        settings["restart"] = stated["restart"].split()
+        around = Surroundings(settings, "4711", "linuxcnc", facts, nominal, struts=struts)
+        return await LINUXCNC.open(around)
+
+    async def silence() -> None:
+        station.cut()
+
+    station.start()
+    try:
+        yield ControllerBench(
+            open=connect,
+            longest_s=3.0 * LONGEST_S,
+            actuators=facts,
+            poses=((0.0, 0.0, 1.0, 0.0, 0.0, 0.0), (2.0, -3.0, -14.0, 0.02, 0.0, 0.03)),
+            unreachable=(0.0, 0.0, 5000.0, 0.0, 0.0, 0.0),
+            parameter="leg1.B_x",
+            silence=silence,
         )
     finally:
         station.stop()

@@ -3,10 +3,18 @@
 from pathlib import Path
 
 import pytest
-from contract_bench import CONTROLLERS, MOTORS, POSE_MOVERS, TRACKERS, controller_bench
+from contract_bench import (
+    CONTROLLERS,
+    MOTORS,
+    POSE_MOVERS,
+    TRACKERS,
+    controller_bench,
+    linuxcnc_bench,
+)
 
 from app.devices import kind_names
 from drivers.contract import CONTROLLER_LAWS, MOTORS_LAWS, POSE_LAWS, TRACKER_LAWS, Law, why_not
+from mocks.linuxcnc.program import why_not as why_not_linuxcnc
 
 
 @pytest.mark.parametrize("law", TRACKER_LAWS, ids=str)
@@ -24,6 +32,16 @@ async def test_controller(kind: str, law: Law, tmp_path: Path) -> None:
     async with controller_bench(CONTROLLERS[kind], tmp_path) as bench:
         if reason := await why_not(law, bench):
             pytest.skip(reason)
+        await law.run(bench)
+
+
+@pytest.mark.long
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("law", CONTROLLER_LAWS, ids=str)
+async def test_linuxcnc(law: Law, tmp_path: Path) -> None:
+    if reason := why_not_linuxcnc():
+        pytest.skip(reason)
+    async with linuxcnc_bench(tmp_path) as bench:
         await law.run(bench)
 
 
@@ -47,4 +65,4 @@ async def test_pose_mover(kind: str, law: Law) -> None:
 
 def test_every_kind_that_ships_has_a_bench() -> None:
     assert set(TRACKERS) == set(kind_names("tracker"))
-    assert {*CONTROLLERS, *MOTORS, *POSE_MOVERS} == set(kind_names("controller"))
+    assert {*CONTROLLERS, "linuxcnc", *MOTORS, *POSE_MOVERS} == set(kind_names("controller"))
