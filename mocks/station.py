@@ -187,9 +187,15 @@ class MockStation:
                 "platform_mass_kg": load.platform_mass_kg,
                 "platform_com": list(load.platform_com),
                 "payload_com": list(load.payload_com),
+                **self._told_payload(),
             },
             "clock": {"scale": self.clock.scale},
         }  # fmt: skip
+
+    def _told_payload(self) -> dict[str, float]:
+        """The payload that somebody has weighed, where no controller tells it."""
+        bare = isinstance(self.controller, CanopenStation) and self.controller.controller is None
+        return {"payload_kg": self.world.payload_kg} if self.pose or bare else {}
 
     def _rough_frame(self) -> list[float]:
         """The base frame in the tracker frame as somebody has measured it with a tape."""

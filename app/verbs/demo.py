@@ -47,6 +47,12 @@ REAL_TIME_EVERY, REAL = 6, 100.0
     help="Folder to make.  [default: out/demo-<date and time>]",
 )
 @click.option(
+    "--bare",
+    "device",
+    flag_value="--bare",
+    help="Drives alone, without a controller: the host computes the legs.",
+)
+@click.option(
     "--pose",
     "device",
     flag_value="--pose",
@@ -76,8 +82,8 @@ def command(
     """Calibrate a mock hexapod without a person, and write a report.
 
     Verifies 216 poses, measures the chosen ones with a laser tracker over TCP, identifies 54
-    parameters, writes them to the motion controller over CAN, and verifies again. With
-    --pose the parameters stay here, in a host store, and every command is computed with them.
+    parameters, writes them to the motion controller over CAN, and verifies again. With --bare
+    or --pose the parameters stay here, in a host store, and every command is computed with them.
     With --linuxcnc 42 parameters go into LinuxCNC's HAL pins and files; it moves in real time, so
     every sixth pose is verified, and a second holds 100 at most.
     """

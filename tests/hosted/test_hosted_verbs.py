@@ -22,7 +22,7 @@ from drivers.interface import Identity
 
 MACHINE = load_machine("hexapod")
 GRID = verification_poses(MACHINE).by_label
-KINDS = ("--pose",)
+KINDS = ("--bare", "--pose")
 
 
 @pytest.fixture(params=KINDS)
