@@ -11,7 +11,7 @@ from typing import Any
 
 import tomli_w
 
-from app.devices import kind_named, kind_names
+from app.devices import Role, kind_named, kind_names
 from app.files.device_settings import read_address, read_settings
 from app.files.machines import load_machine
 from app.files.text import read_text
@@ -176,16 +176,31 @@ def site_of(top: TomlTable, source: str, folder: Path) -> Site:
 
 
 def _standing_alone(top: TomlTable, machine_name: str, folder: Path) -> dict[str, Any]:
-    """The file's tables, with a path of the machine file that holds from everywhere."""
+    """The file's tables, with paths that hold from everywhere."""
     data = top.as_it_stands()
     if machine_name.endswith(".toml"):
         data["machine"] = str((folder / machine_name).resolve())
-    controller = data.get("controller")
-    if isinstance(controller, dict) and isinstance(controller.get("store"), str):
-        data["controller"] = {
-            **controller, "store": str((folder / controller["store"]).resolve())
-        }  # fmt: skip
+    roles: tuple[Role, ...] = ("controller", "tracker")
+    for role in roles:
+        if isinstance(own := data.get(role), dict) and isinstance(own.get("kind"), str):
+            data[role] = {**own, **_absolute(own, role, folder)}
     return data
+
+
+def _absolute(own: Mapping[str, Any], role: Role, folder: Path) -> dict[str, Any]:
+    """The paths among a device's settings, whole; what is no path is refused elsewhere."""
+    if own["kind"] not in kind_names(role):
+        return {}
+    declared = kind_named(role, own["kind"]).settings
+    names = [one.name for one in declared if one.form in ("file", "files")]
+    paths: dict[str, Any] = {}
+    for name in ("store", *names):
+        match own.get(name):
+            case str(path) if path:
+                paths[name] = str((folder / path).resolve())
+            case [*several] if all(isinstance(path, str) for path in several):
+                paths[name] = [str((folder / path).resolve()) for path in several]
+    return paths
 
 
 def _centre(nests: TomlTable, name: str) -> tuple[float, ...]:

@@ -52,3 +52,14 @@ def test_a_lab_with_two_base_nests_is_told_why_that_is_too_few(tmp_path: Path) -
     text = site_text().replace("b3 = [-260.0, 0.0, -30.0]\nb4 = [0.0, -260.0, -30.0]\n", "")
     with pytest.raises(BadInput, match="three tie tracker and base"):
         parse_site(text, "site.toml", tmp_path)
+
+
+def test_every_path_of_a_site_holds_from_the_folder_of_a_session(tmp_path: Path) -> None:
+    six = "[3.0, 3.0, 3.0, 3.0, 3.0, 3.0]"
+    drives = f'kind = "drives"\neds = "a.eds"\nstore = "s"\nspeed = {six}\nacceleration = {six}'
+    text = site_text().replace('kind = "canopen"', f"{drives}\nhoming_method = {six}")
+    site = parse_site(text, "site.toml", tmp_path)
+    copied = parse_site(site.to_toml(), "copy", tmp_path / "elsewhere")
+    assert copied.controller == site.controller
+    assert copied.controller.store == str(tmp_path / "s")
+    assert str(tmp_path / "a.eds") in str(copied.controller.settings["eds"])
