@@ -13,7 +13,10 @@ from calib.arrays import Array
 from calib.mechanism.description import Machine
 from calib.runs.header import Load
 from drivers.errors import ParameterError, Refused
-from drivers.interface import Alarm, ControllerCan, ControllerState
+from drivers.interface import ActuatorState, Alarm, ControllerCan, ControllerState
+
+SHORT_OF_TARGET = 0.02
+"""An actuator that rests farther from its target, mm or rad, did not come to it."""
 
 
 class HostedController:
@@ -125,8 +128,7 @@ class HostedController:
     async def move_to_pose(self, pose: tuple[float, ...]) -> tuple[float, ...]:
         """Command a pose with the set in use and start moving; returns q as it was sent."""
         _ = self.chosen
-        state = await self.state()
-        self._commander.stands_at(tuple(actuator.target for actuator in state.actuators))
+        self._commander.stands_at(tuple(_stands(a) for a in (await self.state()).actuators))
         extension = await asyncio.to_thread(self._commander.extension, pose)
         self._say_what_is_left()
         q = await self._means.send(extension)
@@ -218,3 +220,9 @@ class HostedController:
         """Bring the stored set back into use, read from the disk."""
         self._load()
         _ = self.chosen
+
+
+def _stands(actuator: ActuatorState) -> float:
+    """Where an actuator was last sent; where it is, if it was stopped short of that."""
+    short = abs(actuator.position - actuator.target) > SHORT_OF_TARGET
+    return actuator.position if short and not actuator.moving else actuator.target

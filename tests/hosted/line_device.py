@@ -29,8 +29,9 @@ class Axes(Protocol):
 class BareAxes:
     """Motors that move straight to where they are sent, and move nothing else."""
 
-    def __init__(self, home: Sequence[float]) -> None:
-        self._start = self._goal = [float(q) for q in home]
+    def __init__(self, home: Sequence[float], *, forgets_halt: bool = False) -> None:
+        self._start = self._goal = self._shown = [float(q) for q in home]
+        self._forgets_halt = forgets_halt
         self._began = self._lasts = 0.0
 
     def at(self) -> list[float]:
@@ -38,19 +39,22 @@ class BareAxes:
         return [a + share * (b - a) for a, b in zip(self._start, self._goal, strict=True)]
 
     def goal(self) -> list[float]:
-        return self._goal
+        return self._shown
 
     def moving(self) -> bool:
         return self.at() != self._goal
 
     def go(self, goal: list[float]) -> None:
         self._start, self._goal, self._began = self.at(), goal, monotonic()
+        self._shown = goal
         far = max(abs(a - b) for a, b in zip(self._start, goal, strict=True))
         self._lasts = far / SPEED
 
     def halt(self) -> None:
         self._start = self._goal = self.at()
         self._lasts = 0.0
+        if not self._forgets_halt:
+            self._shown = self._goal
 
 
 class LegsOfWorld:

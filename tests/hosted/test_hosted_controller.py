@@ -29,8 +29,9 @@ POSE = (4.0, -7.0, 224.0, 0.03, -0.05, 0.02)
 
 
 @contextlib.asynccontextmanager
-async def device() -> AsyncIterator[LineServer]:
-    server = LineServer(BareAxes(MACHINE.home_q), [a.limits for a in MACHINE.actuators])
+async def device(*, forgets_halt: bool = False) -> AsyncIterator[LineServer]:
+    axes = BareAxes(MACHINE.home_q, forgets_halt=forgets_halt)
+    server = LineServer(axes, [a.limits for a in MACHINE.actuators])
     await server.open()
     try:
         yield server
@@ -178,9 +179,13 @@ async def told(controller: HostedController, pose: tuple[float, ...], **channels
 
 @contextlib.asynccontextmanager
 async def with_effects(
-    folder: Path, values: dict[str, float], own: dict[str, str] | None = None
+    folder: Path,
+    values: dict[str, float],
+    own: dict[str, str] | None = None,
+    *,
+    forgets_halt: bool = False,
 ) -> AsyncIterator[HostedController]:
-    async with device() as server:
+    async with device(forgets_halt=forgets_halt) as server:
         controller = await connect(server, folder)
         nominal = await controller.read_parameters()
         await controller.replace_parameters(ParameterSet({**nominal, **values}, own or {}))
@@ -267,11 +272,15 @@ async def test_effects_that_mean_nothing_are_refused(
         await controller.close()
 
 
-async def test_a_stop_on_the_way_is_remembered(tmp_path: Path) -> None:
-    """After a stop the legs come from where they were stopped, not from where they were sent."""
+@pytest.mark.parametrize("forgets_halt", [False, True])
+async def test_a_stop_on_the_way_is_remembered(tmp_path: Path, forgets_halt: bool) -> None:
+    """After a stop the legs come from where they were stopped, not from where they were sent.
+
+    Some drives go on telling the target that they were stopped short of.
+    """
     lost = {f"backlash.{limb.name}": 0.04 for limb in MACHINE.limbs}
     low, high = (0.0, 0.0, 205.0, 0.0, 0.0, 0.0), (0.0, 0.0, 235.0, 0.0, 0.0, 0.0)
-    async with with_effects(tmp_path, lost) as controller:
+    async with with_effects(tmp_path, lost, forgets_halt=forgets_halt) as controller:
         await told(controller, low)
         upwards = await told(controller, HOME)
         await told(controller, low)
