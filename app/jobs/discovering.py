@@ -55,12 +55,29 @@ class CandidateEntry(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
+class CarrierEntry(Record):
+    """What depends on a column: ``moves`` is legs, one leg, or every point read.
+
+    ``amplitude`` (``unit``) of a wave; ``direction`` in the tracker frame, where it goes one way.
+    """
+
+    channel: str
+    moves: str
+    period: float | None
+    amplitude: float | None
+    unit: str
+    direction: tuple[float, ...] | None
+    log_evidence: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class UnexplainedEntry(Record):
     """What no known effect explains, and on which columns it depends, strongest first."""
 
     significant: bool
     channels: tuple[str, ...]
     periods: Mapping[str, float] = field(default_factory=dict)
+    carriers: tuple[CarrierEntry, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -97,12 +97,16 @@ class RunDiagnosis:
 
 def _freed(fitted: Fit, one: Candidate) -> Candidate:
     """A candidate in stated sigmas, freed of the noise that the accepted readings share."""
-    if fitted.whitening is None:
+    whitening, between = fitted.whitening, one.between
+    if whitening is None:
         return one
-    shape = one.columns.shape
-    return replace(
-        one, columns=fitted.whitening.apply(one.columns.reshape(*shape[:2], 3, -1)).reshape(shape)
-    )
+
+    def freed(columns: Array) -> Array:
+        shape = columns.shape
+        return whitening.apply(columns.reshape(*shape[:-1], 3, -1)).reshape(shape)
+
+    at = None if between is None else lambda period: freed(between(period))
+    return replace(one, columns=freed(one.columns), between=at)
 
 
 def diagnose_fit(

@@ -23,6 +23,9 @@ SEED = 20_260_801
 """The null draws are the same every time: the same run gets the same answer."""
 
 
+ASTRAY = 1e-3
+"""Relative rise of a fit's cost, by one effect more, that is no rounding."""
+
 BEYOND_DOUBT = -14.0
 """log p from which an effect's own estimate says that it is there, whatever else is in."""
 
@@ -105,7 +108,10 @@ class Refitter:
                     raise
                 first = next(iter(self._stages.values()))
                 return replace(first, effects=names, holdout=float("inf"))
-            self._stages[names] = RunStage(names, hold_out(fitted).rms_mm, fitted, self._examine)
+            smaller = self._fits.get(names[:-1]) if names else None
+            stuck = smaller is not None and worse(fitted, smaller)
+            held = float("inf") if stuck else hold_out(fitted).rms_mm
+            self._stages[names] = RunStage(names, held, fitted, self._examine)
         return self._stages[names]
 
     def _examine(self, fitted: Fit) -> RunDiagnosis:
@@ -118,6 +124,15 @@ class Refitter:
             raise BadInput(
                 f"unknown effect {name!r}", remedy=f"Known: {', '.join(self.effects)}"
             ) from None
+
+
+def worse(larger: Fit, smaller: Fit) -> bool:
+    """Whether a model with more in it explains the same readings worse: its fit went astray.
+
+    What it has more could have stayed at nothing, at the cost of the smaller one.
+    """
+    same = bool(np.array_equal(larger.accepted, smaller.accepted))
+    return same and larger.cost > smaller.cost * (1.0 + ASTRAY) + 0.1
 
 
 def discover_run(refit: Refitter, begin: tuple[str, ...] = ()) -> Discovery:

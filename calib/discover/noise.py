@@ -21,7 +21,7 @@ from calib.noise import estimate
 
 CLEAR = float(np.log(1e-3))
 """log p of a test of structure, on its own, from which noise is asked for in an adequate model."""
-SCATTER = 5.0
+SCATTER = 3.1
 """Standard deviations by which chi-square is off, from which the same holds."""
 ROUNDS = 3
 

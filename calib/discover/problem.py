@@ -17,6 +17,9 @@ from calib.identify.fitting import Fit
 from calib.identify.signatures import EffectColumns
 from calib.mechanism.rigid import rotate, to_euler
 
+MANY = 400
+"""Periods in time that are tried at most for what moves all points alike."""
+
 
 def effect_candidates(
     fit: Fit, problem: LinearProblem, effects: Sequence[EffectColumns]
@@ -78,9 +81,11 @@ def variables_of(fit: Fit) -> list[Variable]:
         for k, (s, leg, axis) in enumerate(zip(rows.extension, own, axes, strict=True))
     ]
     found.append(Variable("direction", _rows_of(fit, rows.direction), (legs,)))
-    found.append(
-        Variable("time_s", _rows_of(fit, rows.time_s), (legs, points), ("smooth", "periodic"))
-    )
+    clock = _rows_of(fit, rows.time_s)
+    found += [
+        Variable("time_s", clock, (legs,), ("smooth", "periodic")),
+        Variable("time_s", clock, (points,), ("smooth", "periodic"), most_periods=MANY),
+    ]
     found += [
         Variable(name, _rows_of(fit, values), (legs, points))
         for name, values in rows.channels.items()

@@ -7,6 +7,7 @@ import numpy as np
 from scipy import special
 
 from calib.discover.agreement import TOGETHER_WORSE, runs_at_odds, untrue_uncertainties
+from calib.discover.carrier import carriers, motion_words
 from calib.discover.diagnosis import RunDiagnosis
 from calib.discover.discovery import stage_of
 from calib.discover.noise_report import noise_report, noise_words
@@ -174,6 +175,7 @@ def _unexplained(diagnosis: Diagnosis) -> dict[str, Any]:
         "significant": unexplained.significant,
         "channels": list(unexplained.channels),
         **({"periods": periods} if periods else {}),
+        "carriers": carriers(unexplained.dependences),
     }
 
 
@@ -203,13 +205,13 @@ def _of_physics(found: RunDiagnosis, refused: Sequence[str]) -> str:
     if told:
         excluded = f" As to noise: {told}.{excluded}"
     if diagnosis.adequate:
-        if told:
-            excluded = excluded.removeprefix(" As to noise:")
-            return f"Nothing else is missing:{excluded}"
         if scatter:
             return (
                 f"Nothing is missing that these readings show. {scatter}: correct them.{excluded}"
             )
+        if told:
+            excluded = excluded.removeprefix(" As to noise:")
+            return f"Nothing else is missing:{excluded}"
         return f"Nothing is missing: the model explains the readings to their noise.{excluded}"
     best = diagnosis.best
     odds = runs_at_odds(found.fit)
@@ -218,8 +220,11 @@ def _of_physics(found: RunDiagnosis, refused: Sequence[str]) -> str:
     if best is None and found.fit.chi2_per_dof < 1.0 and scatter:
         excluded = f" {scatter}: correct them first.{excluded}"
     if best is None:
+        named = ", ".join(effect.id for effect in found.fit.model.effects)
+        so_far = f"{named}: named, but not the whole story. " if named else ""
         return (
-            f"Something is missing that no known effect explains; {_depends(diagnosis)}.{excluded}"
+            f"{so_far}Something is missing that no known effect explains; "
+            f"{_depends(diagnosis)}.{excluded}"
         )
     if best.name in refused:
         return (
@@ -262,8 +267,8 @@ def _depends(diagnosis: Diagnosis) -> str:
         return f"it depends on {channel}"
     if channel != "time_s":
         return f"it depends on {channel} with a period of {period:.3g}"
-    length = f"{period / 60:.0f} min" if period >= 120 else f"{period:.0f} s"
-    return f"it depends on time with a period of {length}"
+    length = f"{period / 60:.3g} min" if period >= 120 else f"{period:.4g} s"
+    return f"it is periodic in time, with a period of {length}{motion_words(strongest[0])}"
 
 
 def _readings(count: int) -> str:

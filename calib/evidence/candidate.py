@@ -1,5 +1,6 @@
 """What could be missing: a named group of columns, at one or several trial values."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -29,6 +30,8 @@ class Candidate:
         beside the whole group.
     channel : str
         For structure of unknown origin: the state variable that it depends on. Empty for effects.
+    between : callable, optional
+        Columns (k, R) at a value between two trials of a scanned unknown.
     """
 
     name: str
@@ -37,6 +40,7 @@ class Candidate:
     trials: tuple[tuple[float, ...], ...] = ((),)
     subsets: tuple[tuple[int, ...], ...] = field(default=())
     channel: str = ""
+    between: Callable[[float], Array] | None = None
 
     def __post_init__(self) -> None:
         if self.columns.ndim != 3 or self.columns.shape[:2] != (

@@ -8,6 +8,7 @@ what is significant then, and belongs to no candidate, is unexplained.
 from collections.abc import Sequence
 
 import numpy as np
+from scipy import optimize
 
 from calib.arrays import Array
 from calib.evidence.bayes import observed
@@ -122,9 +123,29 @@ def _groups(found: Exploration, alpha: float) -> list[tuple[int, ...]]:
     for judged, best in found.decided():
         questioned = _in_question(judged, best, alpha)
         signatures = {index: at_least(judged.scores, index) for index in questioned}
-        if others := rivals(judged.scores, best, questioned, signatures):
+        others = rivals(judged.scores, best, questioned, signatures)
+        others += [one for one in _as_good(judged, best, alpha) if one not in others]
+        if others:
             groups.append((best, *others))
     return groups
+
+
+def _as_good(judged: Round, best: int, alpha: float) -> list[int]:
+    """Candidates that explain as much as the best, each unknown charged with two of chi-square.
+
+    What sizes were thought usual does not count here: they may be wrong by more than e^7.
+    """
+
+    def worth(index: int) -> float:
+        fall, dof = judged.scores.fall(index, *best_hypothesis(judged.scores, index))
+        return fall - 2.0 * dof
+
+    reached, own = worth(best), judged.family.own_log_p
+    return [
+        index
+        for index in judged.evidences
+        if index != best and own[index] <= np.log(alpha) and worth(index) >= reached
+    ]
 
 
 def _in_question(judged: Round, best: int, alpha: float) -> list[int]:
@@ -183,24 +204,48 @@ def _unexplained(judged: Round, quadratic: Sequence[Quadratic], alpha: float) ->
 
 def _dependence(scores: Scores, index: int, log_p: float) -> Dependence:
     candidate = scores.candidates[index]
-    evidence, parts = observed(scores, index)
+    evidence, _ = observed(scores, index)
     number, trial = best_hypothesis(scores, index)
-    period = None
-    if candidate.trials[trial]:
-        period = _peak([one[0] for one in candidate.trials], parts[number][:, 0], trial)
-    return Dependence(candidate.channel, log_p, evidence, period)
+    subset, period = list(candidate.hypotheses[number]), None
+    columns, precision = candidate.columns[trial], candidate.prior_precision
+    if candidate.trials[trial] and candidate.between is not None:
+        period = _refined(scores, index, trial)
+        columns = candidate.between(period)
+    beta, _ = _estimate(scores, columns[subset], precision[subset])
+    return Dependence(
+        candidate.channel,
+        log_p,
+        evidence,
+        period,
+        carrier=candidate.name.partition("(")[2].rstrip(")").partition(",")[0],
+        acting=tuple(candidate.unknowns[k].name for k in subset),
+        estimates=tuple(map(float, beta)),
+        unit=candidate.unknowns[subset[0]].unit,
+    )
 
 
-def _peak(periods: list[float], evidence: Array, best: int) -> float:
-    """Period at the top of a parabola through the best frequency tried and its neighbours."""
-    if not 0 < best < len(periods) - 1:
-        return periods[best]
-    near = slice(best - 1, best + 2)
-    frequency = 1.0 / np.array(periods[near])
-    shift, height = frequency - frequency[1], evidence[near] - evidence[best]
-    (left, right), (low, high) = shift[[0, 2]], height[[0, 2]]
-    curvature = (high / right - low / left) / (right - left)
-    if not curvature < 0.0:
-        return periods[best]
-    top = -0.5 * (high / right - curvature * right) / curvature
-    return float(1.0 / (frequency[1] + np.clip(top, min(shift), max(shift))))
+def _refined(scores: Scores, index: int, trial: int) -> float:
+    """Period between the trials about the best, where chi-square falls most."""
+    candidate = scores.candidates[index]
+    assert candidate.between is not None
+    between, precision = candidate.between, candidate.prior_precision
+    frequencies = np.sort([1.0 / one[0] for one in candidate.trials])
+    at = int(np.searchsorted(frequencies, 1.0 / candidate.trials[trial][0] * (1.0 - 1e-9)))
+    low, high = frequencies[max(at - 1, 0)], frequencies[min(at + 1, frequencies.size - 1)]
+
+    def rise(frequency: float) -> float:
+        return -_estimate(scores, between(1.0 / frequency), precision)[1]
+
+    grid = np.linspace(low, high, 9)
+    best = int(np.argmin([rise(one) for one in grid]))
+    inside = (grid[max(best - 1, 0)], grid[min(best + 1, grid.size - 1)])
+    found = optimize.minimize_scalar(rise, bounds=inside, method="bounded")
+    return float(1.0 / found.x)
+
+
+def _estimate(scores: Scores, columns: Array, precision: Array) -> tuple[Array, float]:
+    """Amplitudes (k,) of columns (k, R) in the observation, and the fall of the cost by them."""
+    weight = columns @ scores.problem.project(columns).T + np.diag(precision)
+    slope = columns @ scores.problem.residual
+    beta = np.linalg.lstsq(weight, slope, rcond=1e-12)[0]
+    return np.asarray(beta), float(beta @ slope)

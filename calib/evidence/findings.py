@@ -54,12 +54,20 @@ class Finding:
 
 @dataclass(frozen=True)
 class Dependence:
-    """A state variable on which the residual depends; ``period`` where a periodic one is best."""
+    """A state variable on which the residual depends; ``period`` where a periodic one is best.
+
+    ``carrier`` is what it moves, ``estimates`` the amplitudes of what moves it, (k,), as named by
+    ``acting``, in ``unit``.
+    """
 
     channel: str
     log_p: float
     log_evidence: float
     period: float | None = None
+    carrier: str = ""
+    acting: tuple[str, ...] = ()
+    estimates: tuple[float, ...] = ()
+    unit: str = ""
 
 
 @dataclass(frozen=True)

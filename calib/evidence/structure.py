@@ -21,7 +21,9 @@ from calib.unknown import Unknown
 ORDER = 4
 """Highest order of the smooth functions (Legendre polynomials over the variable's range)."""
 MOST_PERIODS = 48
-"""Periods that are tried at most for one variable."""
+"""Periods that are tried at most for one variable, unless it says otherwise."""
+MOST_NUMBERS = 10_000_000
+"""Numbers in the columns of one variable beyond which fewer periods are tried."""
 
 Kind = Literal["smooth", "levels", "periodic"]
 
@@ -61,6 +63,8 @@ class Variable:
     kinds : tuple of "smooth", "levels", "periodic"
     shortest : float, optional
         Shortest period that is tried; default twice the median distance of distinct values.
+    most_periods : int
+        Periods that are tried at most; fewer where they would not fit into memory.
     """
 
     name: str
@@ -68,6 +72,7 @@ class Variable:
     responses: tuple[Response, ...]
     kinds: tuple[Kind, ...] = ("smooth",)
     shortest: float | None = None
+    most_periods: int = MOST_PERIODS
 
 
 def structure_candidates(variables: Sequence[Variable]) -> list[Candidate]:
@@ -137,10 +142,16 @@ def _periodic(variable: Variable, response: Response) -> Candidate:
     span = float(np.ptp(values, axis=1).max())
     apart = np.diff(np.unique(variable.values))
     shortest = variable.shortest or max(2.0 * float(np.median(apart)), span / 100.0)
-    frequencies = _frequencies(span, shortest)
-    phase = 2.0 * np.pi * frequencies[:, None, None] * (values - values.min())
-    columns = np.concatenate([np.sin(phase), np.cos(phase)], axis=1)
-    columns *= np.concatenate([response.columns, response.columns])
+    fitting = MOST_NUMBERS // (2 * response.columns.size)
+    most = max(MOST_PERIODS, min(variable.most_periods, fitting))
+    frequencies = _frequencies(span, shortest, most)
+
+    def waves(frequency: Array) -> Array:
+        phase = 2.0 * np.pi * frequency[:, None, None] * (values - values.min())
+        shapes = np.concatenate([np.sin(phase), np.cos(phase)], axis=1)
+        return np.asarray(shapes * np.concatenate([response.columns, response.columns]))
+
+    columns = waves(frequencies)
     count = response.columns.shape[0]
     unknowns = tuple(
         Unknown(f"{variable.name}.{response.name}{axis + 1}.{wave}", *response.scale(axis))
@@ -155,10 +166,11 @@ def _periodic(variable: Variable, response: Response) -> Candidate:
         trials=tuple((float(1.0 / f),) for f in frequencies),
         subsets=subsets,
         channel=variable.name,
+        between=lambda period: waves(np.array([1.0 / period]))[0],
     )
 
 
-def _frequencies(span: float, shortest: float) -> Array:
+def _frequencies(span: float, shortest: float, most: int) -> Array:
     """Frequencies half an independent one apart; where these are too many, the lower half of them.
 
     What floors, air and shadows do is slow: the higher ones share the other half of what may be
@@ -166,7 +178,7 @@ def _frequencies(span: float, shortest: float) -> Array:
     """
     highest = max(1.0 / shortest, 1.5 / span)
     close = np.arange(1.0 / span, highest + 0.25 / span, 0.5 / span)
-    if close.size <= MOST_PERIODS:
+    if close.size <= most:
         return close
-    slow = close[: MOST_PERIODS // 2]
-    return np.concatenate([slow, np.linspace(slow[-1], highest, MOST_PERIODS // 2 + 1)[1:]])
+    slow = close[: most // 2]
+    return np.concatenate([slow, np.linspace(slow[-1], highest, most // 2 + 1)[1:]])

@@ -26,7 +26,7 @@ from calib.scaled import Scaled, normal_matrix
 
 DEMANDED = 1.5
 """Rise of the log likelihood from which a component counts in judging what else is missing."""
-RESCALED = 7.0
+RESCALED = 4.8
 """The same of the scale of the stated sigmas: these are trusted unless clearly wrong."""
 FAINT = 0.3
 """The same below which a component is not tried again beside others."""
