@@ -7,7 +7,7 @@ from asyncio.subprocess import DEVNULL, PIPE, Process
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from drivers.errors import ConnectFailed, LinkLost, ProtocolError, Refused, Silence
 
@@ -17,12 +17,19 @@ LONGEST_LINE = 1 << 20
 Answer = Mapping[str, Any]
 
 
+class Ask(Protocol):
+    """:meth:`LinuxCncLink.ask` of the link that there is now."""
+
+    async def __call__(self, do: str, within_s: float | None = None, **arguments: Any) -> Answer:
+        """One request and its answer."""
+
+
 class LinuxCncLink:
     """One helper; it ends with its standard input, and so with us."""
 
-    def __init__(self, process: Process, device: str, answer_s: float) -> None:
+    def __init__(self, process: Process, device: str, answer_s: float, said: list[str]) -> None:
         self.device = device
-        self.said: list[str] = []
+        self._said = said
         self._process = process
         self._answer_s = answer_s
         self._turn = asyncio.Lock()
@@ -30,9 +37,12 @@ class LinuxCncLink:
 
     @classmethod
     async def open(
-        cls, python: str, env: Mapping[str, str], device: str, answer_s: float
+        cls, python: str, env: Mapping[str, str], device: str, answer_s: float, said: list[str]
     ) -> "LinuxCncLink":
-        """Start the helper; raises ConnectFailed if it does not find a LinuxCNC that runs."""
+        """Start the helper; raises ConnectFailed if it does not find a LinuxCNC that runs.
+
+        ``said`` collects the errors that LinuxCNC reports.
+        """
         try:
             process = await asyncio.create_subprocess_exec(
                 python, str(HELPER), stdin=PIPE, stdout=PIPE, stderr=DEVNULL,
@@ -44,7 +54,7 @@ class LinuxCncLink:
                 device=device,
                 remedy="Write python under [controller]: the Python that has LinuxCNC's modules",
             ) from error
-        link = cls(process, device, answer_s)
+        link = cls(process, device, answer_s, said)
         try:
             first = await link._line(START_S)
         except (LinkLost, Silence) as error:
@@ -76,6 +86,14 @@ class LinuxCncLink:
         Refused
             If LinuxCNC said no.
         """
+        # Whoever asks may be cancelled; an answer that nobody took would be taken for another's.
+        exchange = asyncio.ensure_future(self._exchange(do, within_s, arguments))
+        exchange.add_done_callback(lambda done: done.cancelled() or done.exception())
+        return await asyncio.shield(exchange)
+
+    async def _exchange(
+        self, do: str, within_s: float | None, arguments: Mapping[str, Any]
+    ) -> Answer:
         async with self._turn:
             self._number += 1
             request = json.dumps({"id": self._number, "do": do, **arguments}) + "\n"
@@ -85,14 +103,10 @@ class LinuxCncLink:
                 await self._process.stdin.drain()
             except (OSError, RuntimeError) as error:
                 raise self._lost() from error
-            try:
-                found = await self._line(within_s or self._answer_s)
-            except asyncio.CancelledError:
-                self._kill()  # an answer that nobody waits for would be taken for another's
-                raise
+            found = await self._line(within_s or self._answer_s)
         if found.get("id") != self._number:
             raise ProtocolError(f"the helper answered {found}", device=self.device)
-        self.said += found.get("said", [])
+        self._said += found.get("said", [])
         if not found.get("alive"):
             raise self._lost()
         if not found.get("ok"):

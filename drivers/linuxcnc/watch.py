@@ -1,11 +1,11 @@
 """Looks at LinuxCNC five times a second: gone, in emergency stop, switched off by somebody."""
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from contextlib import suppress
 
 from drivers.errors import DeviceError, DeviceFault
-from drivers.linuxcnc.link import Answer
+from drivers.linuxcnc.link import Answer, Ask
 
 LOOK_S = 0.2
 
@@ -15,7 +15,7 @@ class Watch:
 
     def __init__(
         self,
-        ask: Callable[[str], Awaitable[Answer]],
+        ask: Ask,
         tell: Callable[[DeviceError], None],
         device: str,
     ) -> None:

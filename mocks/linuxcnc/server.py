@@ -1,6 +1,5 @@
 """The controller side of a station: LinuxCNC, and the mock's true machine that follows it."""
 
-import contextlib
 import os
 import subprocess
 import threading
@@ -17,7 +16,7 @@ from mocks.physics.truth import nominal_parameters
 from mocks.world import World
 
 BRIDGE = Path(__file__).with_name("bridge.py")
-LOOK_S = 0.01
+LOOK_S, AGAIN_S = 0.01, 0.3
 STILL_MM = 1e-9
 RESTART = "restart-wanted"
 
@@ -74,9 +73,12 @@ class LinuxCncStation:
                 self._end_bridge()
                 self.program.restart()
                 wanted.unlink(missing_ok=True)
-            with contextlib.suppress(OSError, ValueError):
+            try:
                 self._look()
-            time.sleep(LOOK_S)
+                time.sleep(LOOK_S)
+            except (OSError, ValueError):  # LinuxCNC is gone, or not there yet
+                self._end_bridge()
+                self._over.wait(AGAIN_S)
         self._end_bridge()
 
     def _look(self) -> None:
@@ -91,7 +93,7 @@ class LinuxCncStation:
                 leg.command(motor, 0.0)
 
     def _connected(self) -> "subprocess.Popen[str]":
-        if self._bridge is None or self._bridge.poll() is not None:
+        if self._bridge is None:
             self._bridge = subprocess.Popen(
                 [PYTHON, str(BRIDGE)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL, text=True, env={**os.environ, **self.program.env},
