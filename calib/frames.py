@@ -68,15 +68,43 @@ def fit_frame(points: Array, seen: Array) -> tuple[Frame, float]:
     return frame, float(np.sqrt(np.mean(np.sum(left * left, axis=0))))
 
 
+CLEARLY = 3.0
+"""Times by which another assignment of labels must fit better before anybody is accused of it."""
+
+
+def odd_one(points: Mapping[str, Array], seen: Mapping[str, Array], limit_mm: float) -> str:
+    """The one label without which the others fit within a limit (RMS, mm); empty if none or many.
+
+    At least four are needed: three fit one another in every case but for their distances.
+    """
+    labels = list(seen)
+    found = []
+    for left in labels if len(labels) >= 4 else ():
+        rest = [label for label in labels if label != left]
+        drawn = np.stack([points[label] for label in rest], axis=1)
+        _, rms = fit_frame(drawn, np.stack([seen[label] for label in rest], axis=1))
+        if rms <= limit_mm:
+            found.append((rms, left))
+    found.sort()
+    alone = len(found) == 1 or (len(found) > 1 and CLEARLY * found[0][0] < found[1][0])
+    return found[0][1] if alone else ""
+
+
 def exchanged(
-    points: Mapping[str, Array], seen: Mapping[str, Array], rms_mm: float
+    points: Mapping[str, Array],
+    seen: Mapping[str, Array],
+    rms_mm: float,
+    limit_mm: float = np.inf,
 ) -> dict[str, str]:
-    """Which labels were exchanged: the assignment that fits ``rms_mm``, where it is another one.
+    """Which labels were exchanged: the assignment that fits clearly better than ``rms_mm``.
+
+    It must fit within ``limit_mm`` too: one nest that is off makes a wrong assignment a little
+    better as often as not.
 
     Returns seen label -> true label for those that differ; empty if none fits.
     """
     labels = list(seen)
-    best: tuple[float, tuple[str, ...]] = (rms_mm, tuple(labels))
+    best: tuple[float, tuple[str, ...]] = (min(rms_mm / CLEARLY, limit_mm), tuple(labels))
     for candidate in permutations(labels):
         drawn = np.stack([points[label] for label in candidate], axis=1)
         _, rms = fit_frame(drawn, np.stack([seen[label] for label in labels], axis=1))

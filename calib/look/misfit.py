@@ -39,7 +39,7 @@ CLEAR = 30.0
 """Fall of chi-square by which it must beat what else could step at that moment."""
 LEAST = 3
 """Readings on either side of a step."""
-SMALLEST_SEAT = 0.1
+SMALLEST_SEAT = 0.3
 """Offset of a nest, mm, below which it is a matter of the effect nest-offset."""
 TOO_QUIET = 0.3
 """Scatter over stated sigmas below which these may be another unit."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calib.frames import Frame, exchanged, fit_frame, nest_in_base
+from calib.frames import Frame, exchanged, fit_frame, nest_in_base, odd_one
 
 POINTS = np.array([[260.0, 0, -30], [0, 260.0, -30], [-260.0, 0, -30], [0, -250.0, -10]]).T
 
@@ -46,3 +46,17 @@ def test_exchanged_labels_are_named() -> None:
 def test_a_nest_of_a_turned_platform() -> None:
     place = nest_in_base((1.0, 2.0, 220.0, 0.0, 0.0, np.pi / 2), (0.0, 100.0, 0.0))
     assert place == pytest.approx([-99.0, 2.0, 220.0])
+
+
+def test_one_nest_that_is_off_is_named_and_nobody_is_accused_of_an_exchange() -> None:
+    names = ("b1", "b2", "b3", "b4")
+    # A square: turned by 90 degrees other labels fit as well, and with one nest off even better.
+    square = np.array([[260.0, 0, -30], [0, 260.0, -30], [-260.0, 0, -30], [0, -260.0, -30]])
+    drawn = dict(zip(names, square, strict=True))
+    for off in names:
+        seen = {name: random_frame(4).apply(point) for name, point in drawn.items()}
+        seen[off] = seen[off] + np.array([0.0, 0.2, 0.25])
+        _, rms = fit_frame(square.T, np.stack([seen[name] for name in names], axis=1))
+        assert rms > 0.05
+        assert exchanged(drawn, seen, rms, limit_mm=0.05) == {}
+        assert odd_one(drawn, seen, limit_mm=0.05) == off

@@ -14,7 +14,7 @@ from app.session.routines.moving import ensure_at
 from app.session.routines.reading import reading_row, reading_taken
 from app.session.work import Done, Work
 from calib.arrays import Array
-from calib.frames import exchanged, fit_frame
+from calib.frames import exchanged, fit_frame, odd_one
 from drivers.errors import NotReady
 
 
@@ -56,7 +56,7 @@ async def drift(work: Work, step: Step) -> Done:
     seen = {nest: np.array(last[nest]) for nest in nests}
     frame, rms = fit_frame(_stack(drawn, nests), _stack(seen, nests))
     if rms > work.limits.base_fit_mm:
-        raise _misfit(drawn, seen, rms)
+        raise _misfit(drawn, seen, rms, work.limits.base_fit_mm)
     found = FrameFound(frame.numbers(), rms, tuple(nests))
     if not work.memory.frame_found:
         work.memory.frame, work.memory.frame_found = frame, True
@@ -84,10 +84,16 @@ def _stack(points: Mapping[str, Array | tuple[float, ...]], nests: list[str]) ->
     return np.stack([np.asarray(points[nest], float) for nest in nests], axis=1)
 
 
-def _misfit(drawn: dict[str, Array], seen: dict[str, Array], rms: float) -> NotReady:
+def _misfit(drawn: dict[str, Array], seen: dict[str, Array], rms: float, limit: float) -> NotReady:
     """Say why the base nests do not fit their drawing."""
-    swapped = exchanged(drawn, seen, rms) if len(seen) <= 6 else {}
-    if swapped:
+    swapped = exchanged(drawn, seen, rms, limit) if len(seen) <= 6 else {}
+    if not swapped and (odd := odd_one(drawn, seen, limit)):
+        what = (
+            f"nest {odd} on the base is off: the others fit their drawing, with it they miss it by "
+            f"{rms:.3f} mm RMS"
+        )
+        remedy = f"Re-seat the SMR in {odd}; check that SMR's size and {odd} in [nests.base]"
+    elif swapped:
         pairs = ", ".join(f"{a} is really {b}" for a, b in swapped.items())
         what, remedy = f"base nests were exchanged: {pairs}", "Correct the site file's nests"
     else:
