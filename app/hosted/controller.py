@@ -4,6 +4,8 @@ import asyncio
 import time
 from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
+
 from app.errors import GateRefused
 from app.hosted.command import Commander
 from app.hosted.means import Means
@@ -134,6 +136,14 @@ class HostedController:
         q = await self._means.send(extension)
         self._commander.sent(q)
         return q
+
+    async def move_to_actuators(self, q: tuple[float, ...]) -> tuple[float, ...]:
+        """Command actuator coordinates as they are; returns q as it was sent."""
+        state = await self.state()
+        self._commander.stands_at(tuple(actuator.target for actuator in state.actuators))
+        sent = await self._means.send(self.machine.extension(np.array(q)[:, None])[:, 0])
+        self._commander.sent(sent)
+        return sent
 
     async def would_send(self, poses: Sequence[tuple[float, ...]], labels: Sequence[str]) -> Array:
         """Extensions (n, N) that these poses would be commanded with, one after the other.

@@ -48,6 +48,10 @@ HOME = StepKind("home", "go to the home pose", moves_to="home", often=True)
 MOVE = StepKind("move", "move to pose {pose}", moves_to="pose", often=True)
 CARRY = StepKind("carry", "SMR {smr} into nest {nest}")
 CONFIRM = StepKind("confirm", "is it nest {nest} that the tracker sees?", moves_to="home")
+DIRECTIONS = StepKind(
+    "directions", "each actuator alone, a little: does it move the platform as drawn?",
+    moves_to="home",
+)  # fmt: skip
 READ = StepKind("read", "read nest {nest}", moves_to="pose", rests_on_readings=True, often=True)
 REFERENCE = StepKind("reference", "reference nest {nest} on the base", rests_on_readings=True)
 DRIFT = StepKind("drift", "drift of the base", rests_on_readings=True)
@@ -58,7 +62,7 @@ REST = StepKind("rest", "take the power off the drives", skippable=False)
 KINDS: dict[str, StepKind] = {
     kind.name: kind
     for kind in (
-        CONNECT, CHECK_PATH, TRACKER, DRIVES, WARM_UP, HOME, MOVE, CARRY, CONFIRM, READ,
+        CONNECT, CHECK_PATH, TRACKER, DRIVES, WARM_UP, HOME, MOVE, CARRY, CONFIRM, DIRECTIONS, READ,
         REFERENCE, DRIFT, TWO_FACE, TRUTH, REST,
     )
 }  # fmt: skip

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from app.devices import kind_named
 from app.files.pose_table import Pose
 from app.files.site import Site
 from app.session import kinds
@@ -100,6 +101,8 @@ def _nest_by_nest(
         plan.add(kinds.HOME, f"nest-{nest}", "home, for the SMR to be carried")
         plan.add(kinds.CARRY, nest, f"SMR into nest {nest}", nest=nest, smr=1)
         plan.add(kinds.CONFIRM, nest, nest=nest)
+        if not visited:
+            _directions(plan, site, nest)
         for cycle in range(1, options.cycles + 1):
             for label in poses:
                 if visited and visited % options.reference_every == 0:
@@ -118,6 +121,7 @@ def _pose_by_pose(
         plan.add(kinds.CARRY, nest, nest=nest, smr=smr)
     for nest in nests:
         plan.add(kinds.CONFIRM, nest, nest=nest)
+    _directions(plan, site, nests[0])
     visited = 0
     for cycle in range(1, options.cycles + 1):
         for label in poses:
@@ -130,6 +134,12 @@ def _pose_by_pose(
             if options.truth:
                 plan.add(kinds.TRUTH, label, pose=label)
             visited += 1
+
+
+def _directions(plan: PlanWriter, site: Site, nest: str) -> None:
+    """Drives alone know nothing of the machine: what they move is looked at before a large move."""
+    if kind_named("controller", site.controller.kind).takes == "actuators":
+        plan.add(kinds.DIRECTIONS, nest, nest=nest)
 
 
 def _nests(site: Site, options: PlanOptions) -> list[str]:

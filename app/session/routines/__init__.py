@@ -7,6 +7,7 @@ from app.session import kinds
 from app.session.kinds import StepKind
 from app.session.plan import Step
 from app.session.routines.carrying import carry, confirm
+from app.session.routines.directions import directions
 from app.session.routines.moving import home, move
 from app.session.routines.preparing import check_path, connect, drives, rest, tracker, warm_up
 from app.session.routines.reading import read
@@ -26,6 +27,7 @@ ROUTINES: dict[StepKind, Routine] = {
     kinds.MOVE: move,
     kinds.CARRY: carry,
     kinds.CONFIRM: confirm,
+    kinds.DIRECTIONS: directions,
     kinds.READ: read,
     kinds.REFERENCE: reference,
     kinds.DRIFT: drift,

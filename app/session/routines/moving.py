@@ -65,6 +65,17 @@ async def go(work: Work, label: str) -> None:
     work.tell(LivePose(q, q, moving=False))
 
 
+async def nudge(work: Work, controller: HostedController, q: tuple[float, ...]) -> None:
+    """Move to actuator values near the pose where the machine stands, which is none of the plan."""
+    memory = work.memory
+    memory.standing_at, memory.settled = None, False
+    memory.q = await controller.move_to_actuators(q)
+    row = NewRow("move", work.clock.now(), "", memory.q)
+    work.journal.add_row(work.step, work.attempt, work.clock.utc(), row)
+    await controller.wait_arrived(_timeout(work))
+    memory.arrived_s = work.clock.now()
+
+
 def commanded_coordinates(machine: Machine, pose: Pose) -> tuple[float, ...]:
     """The coordinates that a controller takes: all six, a position, or tilt and azimuth."""
     task = machine.task
