@@ -139,8 +139,7 @@ class HostedController:
 
     async def move_to_actuators(self, q: tuple[float, ...]) -> tuple[float, ...]:
         """Command actuator coordinates as they are; returns q as it was sent."""
-        state = await self.state()
-        self._commander.stands_at(tuple(actuator.target for actuator in state.actuators))
+        self._commander.stands_at(tuple(_stands(a) for a in (await self.state()).actuators))
         sent = await self._means.send(self.machine.extension(np.array(q)[:, None])[:, 0])
         self._commander.sent(sent)
         return sent
