@@ -1,9 +1,10 @@
 """A session on the command line: progress and alarms on standard error, prompts answered there."""
 
 import asyncio
+import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any
@@ -16,6 +17,8 @@ from app.answer import interactive
 from app.session import events as ev
 from app.session.kinds import KINDS
 from app.session.session import Outcome, Session
+
+STOPS = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
 class ConsoleFace:
@@ -144,7 +147,7 @@ async def run_on_console(session: Session, *, quiet: bool) -> Outcome:
 
 @contextmanager
 def stopping(stop: Callable[[], Any]) -> Iterator[None]:
-    """Let SIGINT and SIGTERM call the coroutine function ``stop`` in the running loop."""
+    """Let SIGINT, SIGTERM and a closed terminal (SIGHUP) call ``stop`` in the running loop."""
     loop = asyncio.get_running_loop()
     under_way: set[asyncio.Future[Any]] = set()
 
@@ -153,14 +156,29 @@ def stopping(stop: Callable[[], Any]) -> Iterator[None]:
             under_way.add(asyncio.ensure_future(stop()))
 
     def handle(signum: int, frame: FrameType | None) -> None:
+        if signal.Signals(signum).name == "SIGHUP":
+            _write_to_nobody(terminals)
         loop.call_soon_threadsafe(begin)
 
-    before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
+    terminals = [descriptor for descriptor in (0, 1, 2) if os.isatty(descriptor)]
+    numbers = [getattr(signal, name) for name in STOPS if hasattr(signal, name)]
+    # Who began it with nohup wants it to go on without a terminal.
+    numbers = [n for n in numbers if signal.getsignal(n) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, handle) for number in numbers}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _write_to_nobody(terminals: Iterable[int]) -> None:
+    """Nobody reads a terminal that is gone, and writing to it would end the stop half-way."""
+    nobody = os.open(os.devnull, os.O_RDWR)
+    for descriptor in terminals:
+        with suppress(OSError):
+            os.dup2(nobody, descriptor)
+    os.close(nobody)
 
 
 def unattended(asked: bool) -> bool:

@@ -23,7 +23,9 @@ from canopen.emcy import EmcyError
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from drivers.canopen.eds import dictionary
+from drivers.canopen.reader import FrameReader
 from drivers.canopen.sdo_abort import REMEDIES, abort_words
+from drivers.canopen.slcan_bus import open_bus
 from drivers.errors import (
     ConnectFailed,
     DeviceError,
@@ -104,7 +106,8 @@ class CanLink:
     """An open bus with its nodes. Use :meth:`open`.
 
     Faults that stand (:attr:`faults`, by key) are latched until :meth:`clear_faults`; ``on_fault``
-    is called in the event loop for each new one, ``on_emergency`` for every EMCY.
+    is called in the event loop for each new one, ``on_emergency`` for every EMCY, ``on_damaged``
+    at times with the number of damaged frames that were ignored and what the last one was.
     """
 
     def __init__(self, address: BusAddress) -> None:
@@ -113,8 +116,11 @@ class CanLink:
         self.faults: dict[str, DeviceError] = {}
         self.on_fault: Callable[[DeviceError], None] = lambda _: None
         self.on_emergency: Callable[[int, int, int], None] = lambda *_: None
+        self.on_damaged: Callable[[int, str], None] = lambda *_: None
         self.closed = False
         self._network = canopen.Network()
+        self.reader = FrameReader(self._network, self._damaged, self._gone)
+        self._network.listeners = [self.reader]
         self._locks: dict[int, threading.Lock] = {}
         self._labels: dict[int, str] = {}
         self._heard: dict[int, float] = {}
@@ -146,7 +152,8 @@ class CanLink:
         return link
 
     def _open_bus(self) -> None:
-        self._network.connect(**self.address.options())
+        self._network.bus = open_bus(self.address.options(), self.reader.note)
+        self._network.connect()
         if self.closed:  # too late: nobody waits any more
             self._disconnect()
             return
@@ -226,6 +233,12 @@ class CanLink:
     def _lost(self, error: BaseException) -> LinkLost:
         return LinkLost(f"the link is gone ({error})", device=self.name, remedy=REMEDY_LINK)
 
+    def _gone(self, why: str) -> None:
+        self.latch("link", self._lost(LinkLost(why)))
+
+    def _damaged(self, count: int, what: str) -> None:
+        self.in_loop(self.on_damaged, count, what)
+
     def _receiver_failed(self) -> BaseException | None:
         notifier = self._network.notifier
         return notifier.exception if notifier is not None else None
@@ -279,6 +292,8 @@ class CanLink:
                 # This process itself was held up: what it did not hear meanwhile proves nothing.
                 self._heard = {node: at + now - last_look for node, at in self._heard.items()}
             last_look = now
+            if "link" in self.faults:
+                return  # without our heartbeat the nodes stop, whatever they still hear
             failure = self._receiver_failed()
             if failure is None and now - last_sent >= self.address.heartbeat_s - 0.01:
                 last_sent = now
@@ -347,7 +362,7 @@ class CanLink:
         try:
             closing = self._loop.run_in_executor(self._workers, self._disconnect)
             await asyncio.wait_for(closing, 3.0)
-        except (can.CanError, OSError, TimeoutError) as error:
+        except Exception as error:  # the network raises again what ended its reader
             logger.info("%s: closing: %s", self.name, error)
         self._workers.shutdown(wait=False)
 

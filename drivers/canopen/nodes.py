@@ -16,7 +16,7 @@ from drivers.canopen.drive402 import (
     state_name,
 )
 from drivers.canopen.link import CanLink, Device
-from drivers.errors import ConnectFailed, DeviceError, HeartbeatLost, LinkError, Silence
+from drivers.errors import ConnectFailed, DeviceError, HeartbeatLost, LinkError, LinkLost, Silence
 from drivers.interface import Alarm
 
 FIRST_HEARTBEAT_S = 2.0
@@ -39,6 +39,7 @@ class Nodes:
         self._halting: asyncio.Future[None] | None = None
         link.on_fault = self._on_fault
         link.on_emergency = self._on_emergency
+        link.on_damaged = self._on_damaged
 
     async def watch(self) -> None:
         """Configure both heartbeats, set all nodes OPERATIONAL and hear each of them once.
@@ -102,7 +103,7 @@ class Nodes:
 
     def must_halt(self, fault: DeviceError) -> bool:
         """Whether a fault stops the whole machine from here."""
-        return isinstance(fault, HeartbeatLost)
+        return isinstance(fault, (HeartbeatLost, LinkLost))
 
     def wake(self) -> None:
         """Let those who wait look again."""
@@ -120,6 +121,13 @@ class Nodes:
         else:
             self.latch_drive(node_id, code)
 
+    def _on_damaged(self, count: int, what: str) -> None:
+        remedy = "Check cable, shield and earth of the adapter, if there are more of them."
+        ignored = (
+            f"{count} damaged frame{'s' if count > 1 else ''} ignored so far; the last: {what}"
+        )
+        self.alarm(Alarm(self.link.name, ignored, remedy))
+
     def latch_drive(self, node_id: int, code: int) -> None:
         """Let the fault of a drive stand."""
         self.link.latch(f"drive {node_id}", drive_fault(self.link.label(node_id), code))
@@ -130,6 +138,8 @@ class Nodes:
         try:
             await self.send_stop()
         except LinkError as error:
+            if "link" in self.link.faults:
+                return  # which says that the machine stops by itself
             self.alarm(Alarm(error.device, f"the stop could not be sent: {error.what}", fault=True))
 
     async def send_stop(self, controlword: int = QUICK_STOP) -> None:

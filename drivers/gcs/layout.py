@@ -17,7 +17,7 @@ LIMB, CHANNEL = "limb", "channel"
 Address = tuple[str, int]
 """Item and identifier."""
 
-_ENTRY = re.compile(r"0x([0-9A-Fa-f]+)=\s*(\d+)\s+(\d+)\s+(\w+)\t([^\t]+)\t([^\t]+)")
+_ENTRY = re.compile(r"0x([0-9A-Fa-f]{1,8})=\s*(\d+)\s+([0-9]{1,4})\s+(\w+)\t([^\t]+)\t([^\t]+)")
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,8 @@ LONGEST_ANSWER = 1 << 16
 STOP, MOTION, READY = b"\x18", b"\x05", b"\x07"
 IS_READY, IS_BUSY = "\xb1", "\xb0"
 # What ends a line that was cut off while it was written, without completing it to a command.
+NUMBER = re.compile(r"-?[0-9]{1,9}")
+"""Longer ones are no error codes; Python takes no decimal of more than 4,300 digits."""
 SPOIL = "?\n"
 REMEDY = "Check cable, address and baud rate, then connect again."
 
@@ -117,7 +119,7 @@ class Line:
         self._begin(timeout)
         self._write(f"{text}\nERR?\n")
         answer = self._answer(timeout)
-        if len(answer) == 1 and re.fullmatch(r"-?\d+", answer[0]):
+        if len(answer) == 1 and NUMBER.fullmatch(answer[0]):
             self._in_step = True
             raise refusal(int(answer[0]), text.split(maxsplit=1)[0], self.device)
         self._error_code(timeout)
@@ -130,7 +132,7 @@ class Line:
         answers = []
         while (answer := self._answer(timeout)) != [self.identity]:
             answers.append(" ".join(answer))
-        if not 1 <= len(answers) <= 2 or not re.fullmatch(r"-?\d+", answers[-1]):
+        if not 1 <= len(answers) <= 2 or not NUMBER.fullmatch(answers[-1]):
             raise self._nonsense(" ".join(answers))
         self._in_step = True
         if len(answers) == 1:
@@ -187,7 +189,7 @@ class Line:
 
     def _error_code(self, timeout: float) -> int:
         answer = self._answer(timeout)
-        if len(answer) != 1 or not re.fullmatch(r"-?\d+", answer[0]):
+        if len(answer) != 1 or not NUMBER.fullmatch(answer[0]):
             raise self._nonsense(" ".join(answer))
         return int(answer[0])
 

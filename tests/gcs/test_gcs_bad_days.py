@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 
 import pytest
+import serial
 from gcs_bench import HOME, LOW, Bench, until
 
 from drivers.errors import (
@@ -23,6 +24,8 @@ from drivers.errors import (
     Silence,
 )
 from drivers.gcs import GcsController
+from drivers.gcs.layout import read_layout
+from drivers.gcs.line import Line
 
 
 async def go(controller: GcsController, pose: tuple[float, ...]) -> None:
@@ -286,3 +289,27 @@ def rogue(reply: Rogue) -> Iterator[str]:
 async def test_strangers_are_not_taken_for_a_controller(reply: Rogue, error: type[DeviceError]):
     with rogue(reply) as port, pytest.raises(error):
         await asyncio.wait_for(GcsController.connect(port), 30.0)
+
+
+@pytest.mark.parametrize("sent", ["9" * 5000, "-" + "1" * 4400])
+def test_numbers_without_end_are_named(sent: str):
+    """Python takes no decimal of more than 4,300 digits."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+
+        def serve() -> None:
+            connection, _ = listener.accept()
+            with connection, connection.makefile("rb") as lines:
+                for line in lines:
+                    known = line.endswith(b"*IDN?\n")
+                    connection.sendall(b"maker,type,1,1.0\n" if known else sent.encode() + b"\n")
+
+        threading.Thread(target=serve, daemon=True).start()
+        port = serial.serial_for_url(f"socket://127.0.0.1:{listener.getsockname()[1]}", timeout=0.2)
+        line = Line(port, "controller")
+        for ask in (lambda: line.command("SVO 1 1"), lambda: line.query("POS? 1")):
+            with pytest.raises(ProtocolError):
+                ask()
+        port.close()
+    entry = f"0x7F010001=\t0\t{sent.strip('-')}\tlimb\tL0\tL0"
+    with pytest.raises(ProtocolError):
+        read_layout([entry], "controller")

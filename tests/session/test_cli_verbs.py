@@ -1,6 +1,7 @@
 """The command line as a whole: the list of tasks, exit codes, words, one JSON object."""
 
 import asyncio
+import contextlib
 import json
 import os
 import signal
@@ -92,6 +93,37 @@ def test_an_interrupt_ends_with_4_and_resume_answers_one_json_object(
     _, said = process.communicate(timeout=60)
     assert process.returncode == 4, said
     assert "pkmcal resume" in said
+    assert not mock.hands("truth")["moving"]
+    asyncio.run(set_speed(mock, 20.0))
+    again = cli("resume", "--json", folder=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert json.loads(again.stdout)["readings"] == 14
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no terminal hangs up here")
+def test_a_closed_terminal_stops_the_machine_and_leaves_a_journal_to_resume(
+    mock_of: Callable[..., Mock], tmp_path: Path
+) -> None:
+    import pty
+
+    mock = mock_of("--smrs", "3")
+    asyncio.run(set_speed(mock, 0.02))
+    site = str(mock.site_file(tmp_path))
+    command = ["measure", "--site", site, "--poses", two_poses(tmp_path), "--no-warm-up"]
+    code = "from app.cli import main; main()"
+    child, terminal = pty.fork()
+    if child == 0:
+        os.chdir(tmp_path)
+        os.execv(sys.executable, [sys.executable, "-c", code, *command])
+    deadline = time.monotonic() + 60.0
+    os.set_blocking(terminal, False)
+    while not mock.hands("truth")["moving"] and time.monotonic() < deadline:
+        with contextlib.suppress(BlockingIOError):
+            os.read(terminal, 65536)
+        time.sleep(0.005)
+    os.close(terminal)
+    _, status = os.waitpid(child, 0)
+    assert os.waitstatus_to_exitcode(status) == 4
     assert not mock.hands("truth")["moving"]
     asyncio.run(set_speed(mock, 20.0))
     again = cli("resume", "--json", folder=tmp_path)
