@@ -123,6 +123,8 @@ class Corrector:
             For a channel that an effect depends on and that nobody tells.
         """
         found = dict(told)
+        if np.any(np.asarray(found.get(PAYLOAD, 0.0)) < 0.0):
+            raise BadInput(f"{PAYLOAD} is negative", remedy="Give the mass on the platform, kg")
         region = self.saved.region
         for name in self._asked_for():
             if name in found:

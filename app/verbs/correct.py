@@ -144,6 +144,9 @@ def _told(
             raise BadInput(f"--channel {one}", remedy="Write NAME=VALUE with a number")
         told[name.strip()] = number
     given = {PAYLOAD: payload, TEMPERATURE: temperature}
+    for name, other in given.items():
+        if other is not None and name in told:
+            raise BadInput(f"{name} is told twice", remedy="Say it once")
     return told | {name: value for name, value in given.items() if value is not None}
 
 

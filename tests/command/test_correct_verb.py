@@ -94,6 +94,8 @@ def test_correct_in_a_script_is_the_verb(model: Path, capsys: pytest.CaptureFixt
         (["--pose", "0 0 246 0 0 0", "--payload", "1"], 5, "mm beyond what was measured"),
         (["--pose", HOME, "--payload", "9"], 5, "payload_kg is 4 kg beyond"),
         (["--pose", HOME, "--channel", "payload_kg"], 2, "Write NAME=VALUE"),
+        (["--pose", HOME, "--payload", "-1"], 2, "payload_kg is negative"),
+        (["--pose", HOME, "--payload", "1", "--channel", "payload_kg=2"], 2, "told twice"),
         (["--payload", "1"], 2, "no pose is given"),
         (["--serve", "--pose", HOME], 2, "--pose is no option of --serve"),
         (["--pose", HOME, "--machine", "tripod"], 2, 'not of "tripod"'),
