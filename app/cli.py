@@ -20,7 +20,7 @@ TASKS = (
     ("Measure", ("site", "measure", "resume")),
     ("Identify", ("fit", "compare")),
     ("Find what the model misses", ("diagnose", "discover")),
-    ("Correct and prove it", ("apply", "undo", "correct", "verify", "iso9283", "report")),
+    ("Correct and prove it", ("apply", "undo", "correct", "export", "verify", "iso9283", "report")),
     ("Without hardware", ("demo", "mock", "simulate", "reproduce")),
 )
 

@@ -54,7 +54,7 @@ class Corrector:
             If the file has no values, or is of another machine.
         """
         saved = read_fit(model)
-        described = _machine_of(model, saved, machine)
+        described = machine_of(model, saved, machine)
         values = _values(saved, described)
         effects = chosen_effects(described, (), model)
         left_out = {effect.id: why for effect in effects if (why := why_not(effect))}
@@ -240,8 +240,8 @@ class Solved:
         return 1e3 * place, 1e3 * np.rad2deg(turn)
 
 
-def _machine_of(model: Path, saved: SavedFit, named: str | None) -> Machine:
-    """The machine that is named, or that the model file names."""
+def machine_of(model: Path, saved: SavedFit, named: str | None) -> Machine:
+    """The machine that is named, or that the model file names; raises BadInput."""
     if named is None and not (saved.machine or saved.machine_file):
         raise BadInput(
             "the model file names no machine", place=str(model), remedy="Name it with --machine"
