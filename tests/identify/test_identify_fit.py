@@ -53,7 +53,8 @@ def test_identify_exact_readings_leave_no_residual(simulated):
 def test_identify_jacobian_with_every_effect_against_central_differences(example):
     whole = example("backlash-leg-3")
     frames = fit(Model(whole)).linear.state
-    rows = whole.take([name in ("", "7", "33", "61", "70") for name in whole.pose_name])
+    some = {"", *map(str, range(5, 80, 7))}
+    rows = whole.take([name in some for name in whole.pose_name])
     model = Model(rows, catalogue(rows.machine))
     generator = np.random.default_rng(5)
     effects = tuple(
