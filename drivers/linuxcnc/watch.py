@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable
 from contextlib import suppress
 
-from drivers.errors import DeviceError, DeviceFault
+from drivers.errors import DeviceError, DeviceFault, LinkError
 from drivers.linuxcnc.link import Answer, Ask
 
 LOOK_S = 0.2
@@ -83,4 +83,5 @@ class Watch:
                 self.look(await self._ask("state"))
             except DeviceError as error:
                 self._stand(error)
-                return
+                if isinstance(error, LinkError):
+                    return
