@@ -56,7 +56,9 @@ def held_out_um(run: Run, machine: Machine, effects: Sequence[Effect]) -> tuple[
 def uncorrected_um(hexapod: Machine, extension: Array, true: Array) -> float:
     """RMS of the nests from where the drawing has them, um."""
     real, drawn = forward(hexapod, extension, true).poses, forward(hexapod, extension).poses
-    off = [real.points(p[:, None]) - drawn.points(p[:, None]) for p in nests_of(hexapod)[0].values()]
+    off = [
+        real.points(p[:, None]) - drawn.points(p[:, None]) for p in nests_of(hexapod)[0].values()
+    ]
     return 1e3 * float(np.sqrt(np.mean(np.sum(np.array(off) ** 2, axis=1))))
 
 
