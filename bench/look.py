@@ -29,8 +29,8 @@ def main() -> None:
     with ProcessPoolExecutor(max_workers=2) as pool:
         looked = list(pool.map(clean, seeds, chunksize=10))
         tried = list(pool.map(mistaken, cases, chunksize=5))
-    named = zip(seeds, looked, strict=True)
-    alarms = [(seed, *one) for seed, one in named if one[1]]
+    named = zip(looked, seeds, strict=True)
+    alarms = [(seed, *one) for one, seed in named if one[1]]
     print(f"clean runs: {len(looked)}, with a remark: {len(alarms)}")
     for seed, effect, said in alarms:
         print(f"  seed {seed} ({effect}): {', '.join(said)}")
