@@ -16,6 +16,7 @@ from calib.mechanism.description import Machine
 from calib.runs.header import Load
 from drivers.errors import ParameterError, Refused
 from drivers.interface import ActuatorState, Alarm, ControllerCan, ControllerState
+from drivers.operator.motors import Ask, PersonMoves
 
 SHORT_OF_TARGET = 0.02
 """An actuator that rests farther from its target, mm or rad, did not come to it."""
@@ -77,6 +78,16 @@ class HostedController:
         if self._broken is not None:
             raise self._broken
         return self._commander.chosen
+
+    @property
+    def by_hand(self) -> bool:
+        """Whether a person moves the machine."""
+        return isinstance(self._means.device, PersonMoves)
+
+    def ask_with(self, ask: Ask) -> None:
+        """Let a device that is moved by a person ask with this; others ask nothing."""
+        if isinstance(self._means.device, PersonMoves):
+            self._means.device.ask = ask
 
     def told(self, channels: Mapping[str, float]) -> None:
         """Hear state readings (``payload_kg``, ``structure_temp_C`` ...) for the next commands."""

@@ -1,5 +1,6 @@
 """The shipped drivers on their benches: mocks on real wires, one for each law."""
 
+import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
@@ -18,6 +19,7 @@ from drivers.gcs.pose_kind import KIND as POSE
 from drivers.interface import MotionController, Motors, PoseMover, Tracker
 from drivers.kind import ActuatorFacts, Strut, Surroundings
 from drivers.linuxcnc.kind import KIND as LINUXCNC
+from drivers.operator.motors import PersonMoves
 from mocks.canopen.bare_site import bare_site
 from mocks.canopen.server import CanopenStation
 from mocks.clock import ScaledClock
@@ -207,4 +209,33 @@ TRACKERS: dict[str, Callable[..., contextlib.AbstractAsyncContextManager[Tracker
 }
 CONTROLLERS = {"canopen": "hexapod", "gcs": "tripod"}
 POSE_MOVERS = {"pose": pose_bench}
-MOTORS = {"drives": motors_bench}
+BY_HAND_S = 0.2
+"""How long the person of the bench takes."""
+
+
+@contextlib.asynccontextmanager
+async def by_hand_bench() -> AsyncIterator[MotorsBench]:
+    """A person who does what is asked."""
+    machine = load_machine("hexapod")
+    facts = tuple(ActuatorFacts(a.name, a.unit, a.home, a.limits) for a in machine.actuators)
+    home = tuple(fact.home for fact in facts)
+
+    async def ask(text: str, choices: tuple[str, ...]) -> str:
+        await asyncio.sleep(BY_HAND_S)
+        return choices[0]
+
+    async def connect() -> Motors:
+        person = PersonMoves(facts)
+        person.ask = ask
+        return person
+
+    yield MotorsBench(
+        open=connect,
+        longest_s=LONGEST_S,
+        actuators=facts,
+        places=(home, tuple(value + 5.0 for value in home)),
+        unreachable=(*home[:-1], facts[-1].limits[1] + 1.0),
+    )
+
+
+MOTORS = {"drives": motors_bench, "operator": by_hand_bench}

@@ -99,7 +99,13 @@ def test_every_command_in_the_docs_exists(line: str):
 
 
 @pytest.mark.parametrize(
-    "line", ["pkmcal fitt RUN", "pkmcal fit RUN --added x", "pkmcal mock octopod", "python no.py"]
+    "line",
+    [
+        "pkmcal fitt RUN",
+        "pkmcal fit RUN --added x",
+        "pkmcal mock hexapod --octopod",
+        "python no.py",
+    ],
 )
 def test_a_command_that_does_not_exist_is_noticed(line: str):
     with pytest.raises((click.UsageError, SystemExit, AssertionError)):

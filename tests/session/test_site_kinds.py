@@ -94,4 +94,5 @@ def test_every_kind_says_what_it_needs(role: str, name: str, kind: Kind) -> None
     names = [setting.name for setting in kind.settings]
     assert len(set(names)) == len(names)
     assert all(setting.says for setting in kind.settings)
-    assert any(setting.required for setting in kind.settings)  # where the device is
+    if name != "operator":  # a person is here
+        assert any(setting.required for setting in kind.settings)  # where the device is

@@ -27,6 +27,8 @@ async def directions(work: Work, step: Step) -> Done:
     controller, nest = work.controller, step.args["nest"]
     if not isinstance(controller, HostedController):
         return Done("the controller computes the motion")
+    if controller.by_hand:
+        return Done("a person moves the machine, and sees which way it goes")
     machine = controller.machine
     await ensure_smr(work, nest)
     await ensure_at(work, HOME)

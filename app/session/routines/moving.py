@@ -1,6 +1,7 @@
 """Moves: absolute, so that a move in doubt is simply commanded again."""
 
 import asyncio
+from functools import partial
 
 import numpy as np
 
@@ -49,6 +50,7 @@ async def go(work: Work, label: str) -> None:
     pose = work.pose(label)
     if isinstance(work.controller, HostedController):
         work.controller.told({"delay_s": memory.delay_s, **await channels(work)})
+        work.controller.ask_with(partial(_ask_for_pose, work, label))
     q = await work.controller.move_to_pose(commanded_coordinates(work.site.machine, pose))
     memory.q = q
     row = NewRow("move", work.clock.now(), label, q)
@@ -74,6 +76,11 @@ async def nudge(work: Work, controller: HostedController, q: tuple[float, ...]) 
     work.journal.add_row(work.step, work.attempt, work.clock.utc(), row)
     await controller.wait_arrived(_timeout(work))
     memory.arrived_s = work.clock.now()
+
+
+async def _ask_for_pose(work: Work, label: str, text: str, choices: tuple[str, ...]) -> str:
+    """Ask the person who moves the machine; unattended, nobody does."""
+    return await work.ask(f"Pose {label}. {text}", choices)
 
 
 def commanded_coordinates(machine: Machine, pose: Pose) -> tuple[float, ...]:

@@ -1,0 +1,132 @@
+"""A machine without a link: the program asks, a person moves the mock, the tracker measures."""
+
+import asyncio
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from session_mock import POSES, Mock
+
+from app.errors import StoppedByOperator
+from app.files.runs import read_run
+from app.files.site import Site, parse_site
+from app.session import PlanOptions, Session, measure_plan
+from app.session import events as ev
+from app.session.links import open_controller
+from calib.identify import fit
+from calib.model import Model
+from calib.runs.stack import stack
+from drivers.canopen import CanopenController
+from drivers.errors import DeviceError, NoTarget, Refused
+
+OPTIONS = PlanOptions(order="pose-by-pose", warm_up=False, two_face=False)
+
+
+def by_hand(mock: Mock, folder: Path) -> Site:
+    """The mock's site without the link to its controller."""
+    text = re.sub(
+        r"\[controller\].*?(?=^\[)",
+        '[controller]\nkind = "operator"\nserial = "17"\n\n',
+        mock.site.to_toml(),
+        flags=re.DOTALL | re.MULTILINE,
+    )
+    return parse_site(text, "site.toml", folder)
+
+
+class Person:
+    """Moves the mock as asked, by its own panel, and answers."""
+
+    def __init__(self, panel: CanopenController, says: str = "done") -> None:
+        self.panel, self.says = panel, says
+        self.session: Session | None = None
+        self.asked: list[str] = []
+        self._busy: set[asyncio.Task[None]] = set()
+
+    def hear(self, event: ev.Event) -> None:
+        if isinstance(event, ev.PromptNeeded):
+            task = asyncio.create_task(self._answer(event))
+            self._busy.add(task)
+            task.add_done_callback(self._busy.discard)
+
+    async def _answer(self, prompt: ev.PromptNeeded) -> None:
+        self.asked.append(prompt.text)
+        if self.says == "done":
+            q = tuple(float(v) for v in re.findall(r"q\d = (\S+) mm", prompt.text))
+            await self.panel.move_to_q(q)
+            await self.panel.wait_arrived(30.0)
+        assert self.session is not None
+        self.session.answer_prompt(prompt.prompt, self.says)
+
+
+async def panel_of(mock: Mock) -> CanopenController:
+    panel = await open_controller(mock.site)
+    assert isinstance(panel, CanopenController)
+    await panel.enable()
+    return panel
+
+
+async def test_a_run_is_measured_without_a_link(
+    mock_of: Callable[..., Mock], tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3")
+    panel = await panel_of(mock)
+    person = Person(panel)
+    plan = measure_plan(by_hand(mock, tmp_path), POSES, OPTIONS)
+    session = person.session = Session.create(by_hand(mock, tmp_path), plan, tmp_path)
+    session.observers.watch(person.hear)
+    try:
+        outcome = await session.run()
+    finally:
+        await session.close()
+        await panel.close()
+    assert [text.split(".")[0] for text in person.asked if "Pose a" in text] == ["Pose a"]
+    loaded = read_run(outcome.run_folder)
+    found = fit(Model(stack(loaded.machine, [loaded.run]), []))
+    assert not found.bad
+    assert loaded.run.header.controller_serial == "17"
+
+
+@pytest.mark.parametrize(
+    ("says", "unattended", "ends"),
+    [("cannot be reached", False, Refused), ("done", True, NoTarget)],
+)
+async def test_a_move_that_nobody_makes_ends_the_run(
+    says: str, unattended: bool, ends: type[DeviceError],
+    mock_of: Callable[..., Mock], tmp_path: Path,
+) -> None:  # fmt: skip
+    mock = mock_of("--smrs", "3")
+    site = by_hand(mock, tmp_path)
+    panel = await panel_of(mock)
+    person = Person(panel, says)
+    session = person.session = Session.create(
+        site, measure_plan(site, POSES, replace(OPTIONS)), tmp_path, unattended=unattended
+    )
+    session.observers.watch(person.hear)
+    try:
+        with pytest.raises(ends):
+            await session.run()
+    finally:
+        await session.close()
+        await panel.close()
+    assert len(person.asked) == (not unattended)
+
+
+async def test_a_stop_ends_the_waiting_for_a_person(
+    mock_of: Callable[..., Mock], tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3")
+    site = by_hand(mock, tmp_path)
+    session = Session.create(site, measure_plan(site, POSES, OPTIONS), tmp_path)
+    asked = asyncio.Event()
+    session.observers.watch(lambda e: asked.set() if isinstance(e, ev.PromptNeeded) else None)
+    running = session.start()
+    try:
+        async with asyncio.timeout(60.0):
+            await asked.wait()
+        await session.stop()
+        with pytest.raises(StoppedByOperator):
+            await running
+    finally:
+        await session.close()
