@@ -2,6 +2,7 @@
 
 import io
 import sys
+from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -47,6 +48,17 @@ class Verbs(click.Group):
         command.name = cmd_name
         return command
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the verb; one that does not exist is answered with what may have been meant."""
+        verbs = self.list_commands(ctx)
+        if args and args[0] not in verbs and not args[0].startswith("-"):
+            near = get_close_matches(args[0], verbs)
+            hint = f"Did you mean {' or '.join(near)}?" if near else "pkmcal --help lists them."
+            raise click.UsageError(f'There is no verb "{args[0]}". {hint}', ctx)
+        return super().resolve_command(ctx, args)
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the verbs by task, without importing any of them."""
         left = self.list_commands(ctx)
@@ -87,6 +99,11 @@ def pkmcal(context: click.Context, site: Path | None, folder: Path) -> None:
     5 refused by a safety gate.
     """
     if context.invoked_subcommand is None:
+        if not (sys.stdin.isatty() and sys.stderr.isatty()):
+            raise BadInput(
+                "the screens need a terminal, and there is none",
+                remedy="Use the verbs: pkmcal --help lists them",
+            )
         try:
             screens: Any = import_module("app.tui")
             run = screens.run

@@ -63,6 +63,45 @@ def test_bad_usage_and_bad_input_end_with_2(
     assert "no plan.json" in capsys.readouterr().err
 
 
+def test_a_mistyped_verb_is_answered_with_the_one_meant(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run(["mesure"]) == 2
+    assert "Did you mean measure" in capsys.readouterr().err
+    assert run(["qqqqqq"]) == 2
+    assert "--help" in capsys.readouterr().err
+
+
+def test_screens_without_a_terminal_end_with_2_and_a_sentence(tmp_path: Path) -> None:
+    said = subprocess.run(
+        [sys.executable, "-c", "from app.cli import main; main()"],
+        cwd=tmp_path, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=100,
+    )  # fmt: skip
+    assert (said.returncode, said.stdout) == (2, "")
+    assert "need a terminal" in said.stderr
+
+
+def test_an_installation_without_any_kind_of_device_is_told_to_be_made_again(
+    tmp_path: Path,
+) -> None:
+    """All packages are there, but what was installed of pkmcal names no entry points."""
+    for entry in Path(pytest.__file__).parents[1].iterdir():
+        if not entry.name.startswith(("pkmcal", "__editable__")) and entry.suffix != ".pth":
+            (tmp_path / entry.name).symlink_to(entry)
+    root = str(VERBS.parents[1])
+    code = (
+        f"import sys; sys.path[:0] = [{str(tmp_path)!r}, {root!r}]; "
+        "from app.cli import main; main(['site', 'kinds'])"
+    )
+    said = subprocess.run(
+        [sys.executable, "-S", "-c", code],
+        cwd=tmp_path, capture_output=True, text=True, timeout=100,
+    )  # fmt: skip
+    assert said.returncode == 2, said.stderr
+    assert "no kind of controller is installed" in said.stderr
+    assert "Install pkmcal again" in said.stderr
+
+
 def test_nobody_at_the_address_ends_with_3(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
