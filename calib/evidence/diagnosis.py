@@ -8,7 +8,6 @@ what is significant then, and belongs to no candidate, is unexplained.
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import optimize
 
 from calib.arrays import Array
 from calib.evidence.bayes import observed
@@ -239,6 +238,8 @@ def _refined(scores: Scores, index: int, trial: int) -> float:
     grid = np.linspace(low, high, 9)
     best = int(np.argmin([rise(one) for one in grid]))
     inside = (grid[max(best - 1, 0)], grid[min(best + 1, grid.size - 1)])
+    from scipy import optimize  # a third of the time that a verb takes to start
+
     found = optimize.minimize_scalar(rise, bounds=inside, method="bounded")
     return float(1.0 / found.x)
 

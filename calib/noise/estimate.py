@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize, special
+from scipy import special
 
 from calib.arrays import Array
 from calib.evidence.problem import LinearProblem
@@ -161,6 +161,8 @@ def _joined(likelihood: _Likelihood, now: _Sizes, part: str) -> _Sizes:
     grid = np.linspace(low, high, 6)
     values = [likelihood.at(parts, (*now.logs, one)) for one in grid]
     at = int(np.argmin(values))
+    from scipy import optimize  # slow to import: only where noise is estimated
+
     found = optimize.minimize_scalar(
         lambda one: likelihood.at(parts, (*now.logs, float(one))),
         bounds=(float(grid[max(at - 1, 0)]), float(grid[min(at + 1, grid.size - 1)])),

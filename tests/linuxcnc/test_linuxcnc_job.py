@@ -19,7 +19,7 @@ def test_the_job_on_linuxcnc_leaves_what_the_tracker_cannot_see(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PKMCAL_STATE", str(tmp_path / "state"))
-    words = command_of("demo", "--linuxcnc", "--lead", str(LEAD_MM), "--json")
+    words = command_of("demo", "--linuxcnc", "--lead", str(LEAD_MM), "--poses", "20", "--json")
     done = subprocess.run(
         [*words, "--out", str(tmp_path / "out")], capture_output=True, text=True, timeout=780
     )
