@@ -76,7 +76,7 @@ def main(arguments: list[str]) -> int:
         return run("pkmcal", *(["demo"] if job == "demo" else []), *rest)
     if job == "test":
         ensure_environment("dev")
-        return run("pytest", *(rest or ["-n", "2"]))
+        return run("pytest", *(rest or ["-n", "4"]))  # half of the time they wait for machines
     if job == "check":
         ensure_environment("dev")
         return max(run(*check) for check in CHECKS)

@@ -11,7 +11,8 @@ from drivers.drives.axis import Axis
 from drivers.drives.plan import Referenced
 from drivers.drives.profile import Profile
 
-WAYS = st.lists(st.floats(-40.0, 40.0), min_size=2, max_size=6)
+WAY = st.floats(-40.0, 40.0).map(lambda way: round(way, 9))  # a drive counts no finer
+WAYS = st.lists(WAY, min_size=2, max_size=6)
 FASTEST = st.tuples(st.floats(0.5, 50.0), st.floats(1.0, 500.0))
 
 

@@ -51,9 +51,9 @@ FIELDS = {
     "reference_repeatability structure together actuators worst_poses bad_readings record advice "
     "proposed",
     "CorrectReport": "machine model actuators effects left_out remarks channels poses",
-    "DiagnosisReport": "baseline adequate record candidates indistinguishable unexplained "
+    "DiagnosisReport": "baseline adequate record candidates indistinguishable unexplained noise "
     "bad_readings unavailable not_on_this_machine advice",
-    "DiscoveryReport": "steps effects adequate record indistinguishable unexplained "
+    "DiscoveryReport": "steps effects adequate record indistinguishable unexplained noise "
     "bad_readings unavailable parameters refused advice",
     "FitReport": "effects readings chi2_per_dof rms_um noise_floor_um holdout_rms_um "
     "holdout_floor_um parameters unidentified unidentified_words bad_readings left_out_readings "
