@@ -9,6 +9,8 @@ import pytest
 
 from app.cli import run as pkmcal
 
+pytestmark = pytest.mark.long
+
 RUNS = Path(__file__).parents[1] / "data" / "runs"
 
 

@@ -23,6 +23,8 @@ from mocks.simulate.files import points_csv, run_toml
 from mocks.simulate.plan import Profile, RunPlan
 from mocks.simulate.run import simulate
 
+pytestmark = pytest.mark.long
+
 PROFILE = Profile(rise_K=8.0, payload_kg=(0.0, 12.0, 0.0, 12.0))
 CASES = [
     (next(name for name in BODIES if name in effect.machines), effect)

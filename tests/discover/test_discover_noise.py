@@ -16,6 +16,8 @@ from mocks.simulate.files import points_csv, run_toml
 from mocks.simulate.plan import RunPlan
 from mocks.simulate.run import simulate
 
+pytestmark = pytest.mark.long
+
 SIGMA_MM = 0.005
 
 

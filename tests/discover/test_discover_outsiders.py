@@ -14,6 +14,8 @@ from mocks.hidden.table import Hidden
 from mocks.simulate import RunPlan, simulate
 from mocks.simulate.files import write
 
+pytestmark = pytest.mark.long
+
 RUNS = Path(__file__).parents[1] / "data" / "runs"
 CLEAN = RUNS / "no-effect"
 

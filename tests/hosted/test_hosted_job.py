@@ -22,6 +22,8 @@ from calib.poses import verification_poses
 from calib.runs import Run
 from calib.runs.stack import stack
 
+pytestmark = pytest.mark.long
+
 MACHINE = load_machine("hexapod")
 EFFECTS = ("backlash", "gravity-sag", "screw-cyclic")
 HIDDEN = {

@@ -107,6 +107,8 @@ from pathlib import Path
 from app.files.site import load_site
 from app.session.links import open_controller
 
+pytestmark = pytest.mark.long
+
 async def main():
     controller = await open_controller(load_site(Path(sys.argv[1])))
     await controller.write_parameters({"leg1.L0": 240.0})

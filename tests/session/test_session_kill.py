@@ -15,6 +15,8 @@ from session_mock import POSES, Mock
 from app.files.pose_table import poses_text
 from app.session.journal import Journal
 
+pytestmark = pytest.mark.long
+
 
 def command(*arguments: str) -> list[str]:
     return [sys.executable, "-c", "from app.cli import main; main()", *arguments]
