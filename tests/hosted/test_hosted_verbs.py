@@ -24,6 +24,8 @@ MACHINE = load_machine("hexapod")
 GRID = verification_poses(MACHINE).by_label
 KINDS = ("--bare", "--pose")
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(params=KINDS)
 def station(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Path]:
@@ -106,8 +108,6 @@ import asyncio, sys
 from pathlib import Path
 from app.files.site import load_site
 from app.session.links import open_controller
-
-pytestmark = pytest.mark.long
 
 async def main():
     controller = await open_controller(load_site(Path(sys.argv[1])))

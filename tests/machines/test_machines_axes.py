@@ -123,6 +123,7 @@ def test_unknowns_of_all_effects_are_unique(rows_of, name):
 )
 def test_what_is_saved_is_read_back(run_of, tmp_path, capsys, name, effect):
     source = run_of(name)
+    capsys.readouterr()  # where the run has only now been made, that was said too
     saved = tmp_path / "model.toml"
     assert run(["fit", str(source), "--add", effect, "--save", str(saved), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)["parameters"]
