@@ -1,6 +1,6 @@
 """Cases of the blind trial: what is hidden, how large, and how it is measured."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -136,14 +136,19 @@ def build_follow_up(
     return simulate(plan)
 
 
-def draw_cases(count: int, seed: int, machine: str) -> list[Case]:
+def draw_cases(
+    count: int, seed: int, machine: str, allowed: Collection[str] | None = None
+) -> list[Case]:
     """Equal shares over the catalogue at several sizes, pairs, triples, and unknown ones.
 
     Every effect comes as often as any other; the set of poses is drawn for each case, the
-    designed ones for more than half of the single effects of size 1.
+    designed ones for more than half of the single effects of size 1. ``allowed`` limits the known
+    effects that are hidden, not those that are looked for: a trial of a smaller catalogue again.
     """
     rng = np.random.default_rng([seed, len(machine)])
     names, unknown = drawn_on(machine, unknown=False), drawn_on(machine, unknown=True)
+    if allowed is not None:
+        names = [name for name in names if name in allowed]
     cases = []
     for number in range(count):
         kind, turn = number % 10, number // 10

@@ -168,15 +168,18 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--machines", default="hexapod,tripod,ptm")
     parser.add_argument("--only", choices=("single", "several", "unknown"))
+    parser.add_argument("--hide", help="effects that may be hidden, by comma; all by default")
     parser.add_argument("--page", type=Path)
     options = parser.parse_args()
     command = f"python -m bench blind --cases {options.cases} --null {options.null}"
+    command += f" --hide {options.hide}" if options.hide else ""
+    allowed = options.hide.split(",") if options.hide else None
     text = f"# Blind trial\n\nWritten by `{command} --seed {options.seed}`.\n{INTRODUCTION}"
     for machine in options.machines.split(","):
         begin = time.perf_counter()
         cases = [
             case
-            for case in draw_cases(options.cases, options.seed, machine)
+            for case in draw_cases(options.cases, options.seed, machine, allowed)
             if options.only is None or options.only == case.kind
         ]
         nulls = draw_nulls(options.null, options.seed, machine)
