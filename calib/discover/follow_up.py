@@ -139,9 +139,11 @@ class FollowUp:
         return replace(self.rows, path=path, at=at)
 
     def columns(self, effect: Effect, values: Array, rows: Rows) -> Array:
-        """Whitened derivatives (k, 3, N) by the linear unknowns of an effect."""
+        """Whitened derivatives (k, 3, N) by an effect's linear unknowns; none if it is over."""
         situation = replace(self.situation, rows=rows)
         linear = linear_among(effect.unknowns(rows))
+        if effect.ends_with_run:
+            return np.zeros((int(linear.sum()), 3, rows.count))
         shapes = whitened_columns(effect.signature(situation, values), situation)
         return np.asarray(shapes[: linear.size][linear])
 

@@ -140,6 +140,8 @@ class Effect(ABC):
         Columns of :class:`Rows` on which the extensions depend beside the pose: readings that
         agree in them share one closure. An effect that remembers names ``path`` (and ``time_s``
         if it matters how long the machine stood): it reads ``situation.rows.path``.
+    ends_with_run : bool
+        Whether what happened at some moment is over when its run ends: no follow-up sees it.
     wrong_sign : str
         What a negative value most likely says of the record; empty where both signs can be.
     wrong_size : str
@@ -151,6 +153,7 @@ class Effect(ABC):
     says: str
     channels: tuple[str, ...] = ()
     depends: tuple[str, ...] = ()
+    ends_with_run: bool = False
     wrong_sign: str = ""
     wrong_size: str = ""
 

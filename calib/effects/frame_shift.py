@@ -1,7 +1,8 @@
 """The base reference or the tool changed at some moment of the run: a rigid step.
 
 Either all platform nests step in the platform frame (a tool touched), or the base frame steps in
-the tracker frame (base or tracker touched). The moment is searched between the readings.
+the tracker frame (base or tracker touched). The moment is searched between the readings. Several
+runs stand one after the other on its clock; a run begins with nests and frames as they then are.
 """
 
 from collections.abc import Iterator
@@ -10,13 +11,12 @@ import numpy as np
 
 from calib.arrays import Array
 from calib.effects.component import Effect, Signature, Situation
+from calib.effects.run_clock import about, between, from_then_on, run_starts, spread
 from calib.effects.tracker import rigid_motions
 from calib.mechanism.rigid import cross, rotate
 from calib.runs.stack import Rows
 from calib.unknown import Unknown
 
-MOMENTS = 40
-"""Most moments that are tried."""
 EDGE = 0.06
 """Part of the readings at either end in which a step cannot be told from bad readings."""
 
@@ -27,16 +27,15 @@ class FrameShift(Effect):
     id = "frame-shift"
     kind = "measurement"
     says = "the base reference or the tool changed at some moment of the run"
+    ends_with_run = True
 
     def unavailable(self, rows: Rows) -> str:
-        """Time must pass, and one run only: further runs have frames of their own anyway."""
-        if len(rows.runs) > 1:
-            return "several runs have frames of their own; look at one run alone"
-        return "" if len(_moments(rows)) > 0 else "all readings have the same time"
+        """Time must pass."""
+        return "" if _every_moment(rows).size else "all readings have the same time"
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``frame-shift.x`` .. ``.rz``, mm and rad; ``.t0`` in s; ``.where``."""
-        moments = _moments(rows)
+        moments = spread(_every_moment(rows))
         gap = float(np.median(np.diff(moments))) if len(moments) > 1 else 1.0
         return (
             *(Unknown(f"frame-shift.{axis}", "mm", 0.05) for axis in ("x", "y", "z")),
@@ -48,22 +47,20 @@ class FrameShift(Effect):
     def trials(self, rows: Rows) -> Iterator[tuple[float, ...]]:
         """Every moment, on the platform and on the base."""
         for where in (0.0, 1.0):
-            for moment in _moments(rows):
+            for moment in spread(_every_moment(rows)):
                 yield (float(moment), where)
 
     def refined(self, rows: Rows, trial: tuple[float, ...]) -> Iterator[tuple[float, ...]]:
         """Every moment between the neighbouring ones that were tried, within one time too."""
-        tried, every = _moments(rows), _between(rows, rows.moment)
-        at = int(np.searchsorted(tried, trial[0]))
-        low, high = tried[max(at - 1, 0)], tried[min(at + 1, tried.size - 1)]
-        for moment in every[(every >= low) & (every <= high)]:
+        tried = spread(_every_moment(rows))
+        for moment in about(tried, _between(rows, rows.moment), trial[0]):
             yield (float(moment), trial[1])
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """A rigid motion of everything read after the moment."""
         rows = situation.rows
         moment, where = values[6], values[7]
-        after = (rows.moment >= moment).astype(np.float64)
+        after = from_then_on(rows, rows.moment, float(moment)).astype(np.float64)
         shape = np.zeros((8, 3, rows.count))
         if where > 0.5:
             motions = _motions(situation.base_point, values[3:6])
@@ -92,25 +89,18 @@ def _motions(point: Array, turn: Array) -> Array:
     return motions
 
 
-def _moments(rows: Rows) -> Array:
-    """Moments that are tried first."""
-    between = _every_moment(rows)
-    if between.size <= MOMENTS:
-        return between
-    return np.asarray(between[np.linspace(0, between.size - 1, MOMENTS).astype(int)])
-
-
 def _every_moment(rows: Rows) -> Array:
-    """Moments between successive times, away from the ends of the run."""
+    """Moments between successive times, away from the ends of each run."""
     return _between(rows, rows.time_s)
 
 
 def _between(rows: Rows, times: Array) -> Array:
-    """Moments between successive ``times`` (N,), away from the ends of the run."""
-    times = np.sort(times)
-    edge = max(2, int(EDGE * times.size))
-    inner = times[edge : times.size - edge]
-    return np.asarray(0.5 * (inner[1:] + inner[:-1])[np.diff(inner) > 0])
+    """Moments between successive ``times`` (N,) of a run, away from its ends."""
+    found = []
+    for run, start in enumerate(run_starts(rows)):
+        here = np.sort(times[rows.run == run])
+        found.append(start + between(here, max(2, int(EDGE * here.size))))
+    return np.concatenate(found)
 
 
 EFFECTS = (FrameShift(),)
