@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from app.files.models import chosen_effects
+from app.files.models import chosen_effects, offered_effects
 from app.files.runs import read_runs
 from calib.discover.discovery import Refitter
 from calib.effects import Effect, catalogue, effect_named
@@ -39,13 +39,16 @@ def load_refitter(
     add: tuple[str, ...] = (),
     model: Path | None = None,
     watch: Callable[[tuple[str, ...]], None] | None = None,
+    offer: Sequence[Path] = (),
 ) -> tuple[Refitter, tuple[str, ...]]:
     """Make runs ready for diagnosis: a refitter over the catalogue, and the effects to begin with.
 
-    ``watch`` is told the effects of every model that is looked at.
+    ``offer`` are effect files that are candidates beside the catalogue; ``watch`` is told the
+    effects of every model that is looked at.
     """
     rows, effects = load_rows(runs, add, model)
-    known = {effect.id: effect for effect in (*catalogue(rows.machine), *effects)}
+    candidates = (*catalogue(rows.machine), *offered_effects(offer, effects), *effects)
+    known = {effect.id: effect for effect in candidates}
     refit = Refitter(rows, tuple(known.values()), watch=watch)
     return refit, tuple(effect.id for effect in effects)
 

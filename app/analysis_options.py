@@ -26,6 +26,31 @@ def model_options(function: _Function) -> _Function:
     )(function)
 
 
+def offer_options(function: _Function) -> _Function:
+    """Give a verb ``--offer FILE`` (repeatable) and ``--site FILE``; see :func:`offers`."""
+    function = click.option(
+        "--site",
+        type=click.Path(path_type=Path),
+        help="Offer the effects that this site file names in [effects].",
+    )(function)
+    return click.option(
+        "--offer",
+        multiple=True,
+        type=click.Path(path_type=Path),
+        metavar="FILE",
+        help="An effect file that is a candidate beside the catalogue (repeatable).",
+    )(function)
+
+
+def offers(offer: tuple[Path, ...], site: Path | None) -> tuple[Path, ...]:
+    """Effect files that are candidates: those of ``--offer``, and those that the site names."""
+    if site is None:
+        return offer
+    from app.files.site import load_site  # its devices' kinds: only where a site is named
+
+    return (*load_site(site).offers, *offer)
+
+
 def watcher() -> Callable[[tuple[str, ...]], None] | None:
     """Tells every model that is looked at on standard error, on a terminal."""
     return _tell if answer.interactive() else None

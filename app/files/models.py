@@ -5,6 +5,7 @@ never written to.
 """
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -122,6 +123,29 @@ def read_own_effect(path: Path) -> OperatorEffect:
             remedy="Give the effect an id of its own",
         )
     return effect
+
+
+def offered_effects(files: Iterable[Path], chosen: Iterable[Effect] = ()) -> list[Effect]:
+    """A lab's own effects that stand beside the catalogue as candidates, each read from its file.
+
+    One that is in the model already (``chosen``) is not offered again. Raises BadInput with file,
+    line and column of a fault, and for two files with one id.
+    """
+    held = {effect.id for effect in chosen}
+    found: dict[str, Path] = {}
+    offered: list[Effect] = []
+    for path in files:
+        effect = read_own_effect(path)
+        if effect.id in found and path.resolve() != found[effect.id].resolve():
+            raise BadInput(
+                f"two offered effects have the id {effect.id!r}",
+                place=f"{found[effect.id]} and {path}",
+                remedy="Give each an id of its own",
+            )
+        if effect.id not in found and effect.id not in held:
+            offered.append(effect)
+        found[effect.id] = path
+    return offered
 
 
 def chosen_effects(machine: Machine, add: tuple[str, ...], model: Path | None) -> list[Effect]:

@@ -123,6 +123,8 @@ class Site:
     hands: Hands
     limits: Limits
     clock_scale: float
+    offers: tuple[Path, ...] = ()
+    """Effect files that discovery has as candidates beside the catalogue."""
     controller_parameters: Mapping[str, float] = field(default_factory=dict)
 
     def to_toml(self) -> str:
@@ -168,6 +170,7 @@ def site_of(top: TomlTable, source: str, folder: Path) -> Site:
         hands=_hands(top.table("hands", required=False)),
         limits=_limits(top.table("limits", required=False)),
         clock_scale=_clock(top.table("clock", required=False)),
+        offers=_offers(top.table("effects", required=False), folder),
     )
     nests.end()
     top.end()
@@ -180,6 +183,9 @@ def _standing_alone(top: TomlTable, machine_name: str, folder: Path) -> dict[str
     data = top.as_it_stands()
     if machine_name.endswith(".toml"):
         data["machine"] = str((folder / machine_name).resolve())
+    if isinstance(offered := data.get("effects"), dict) and "offer" in offered:
+        files = [str((folder / str(name)).resolve()) for name in offered["offer"]]
+        data["effects"] = {**offered, "offer": files}
     roles: tuple[Role, ...] = ("controller", "tracker")
     for role in roles:
         if isinstance(own := data.get(role), dict) and isinstance(own.get("kind"), str):
@@ -292,6 +298,17 @@ def _clock(table: TomlTable) -> float:
     scale = table.number("scale", 1.0, above=0.0, most=math.inf)
     table.end()
     return scale
+
+
+def _offers(table: TomlTable, folder: Path) -> tuple[Path, ...]:
+    """Effect files; each must be one now, not when a run has been measured."""
+    files = tuple((folder / name).resolve() for name in table.texts("offer"))
+    table.end()
+    if files:
+        from app.files.models import offered_effects  # slow to import, and most sites offer none
+
+        offered_effects(files)
+    return files
 
 
 def _load(top: TomlTable) -> tuple[Load | None, float | None]:

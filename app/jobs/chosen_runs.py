@@ -24,6 +24,11 @@ def path_of(file: File | None) -> Path | None:
     return None if file is None else Path(file)
 
 
+def paths_of(files: Sequence[File]) -> tuple[Path, ...]:
+    """Paths of several files."""
+    return tuple(Path(file) for file in files)
+
+
 def at_least(least: int, **given: int) -> None:
     """Refuse numbers that are too small; raises BadInput naming the argument."""
     for name, value in given.items():

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from app.analysis import asked_for, load_refitter
-from app.jobs.chosen_runs import File, Runs, names_of, path_of
+from app.jobs.chosen_runs import File, Runs, names_of, path_of, paths_of
 from app.jobs.fitting import BadReadingEntry, RemarkEntry, keep_model
 from app.jobs.record import Record, Report
 from calib.discover.discovery import discover_run, stage_of
@@ -179,6 +179,7 @@ def diagnose(
     *,
     add: Sequence[str] = (),
     model: File | None = None,
+    offer: Sequence[File] = (),
     watch: Watch | None = None,
 ) -> DiagnosisReport:
     """Score every known effect against what the fit leaves: which one is missing?
@@ -187,6 +188,8 @@ def diagnose(
     ----------
     runs, add, model
         As for :func:`fit`.
+    offer : sequence of paths, optional
+        Effect files (docs/own-effects.md) that are candidates beside the catalogue.
     watch : callable, optional
         Told the effects of each model that is fitted.
 
@@ -205,7 +208,7 @@ def diagnose(
     >>> asked.adequate, asked.candidates[0].effect                           # doctest: +SKIP
     (False, 'backlash')
     """
-    refit, begin = load_refitter(names_of(runs), tuple(add), path_of(model), watch)
+    refit, begin = load_refitter(names_of(runs), tuple(add), path_of(model), watch, paths_of(offer))
     return DiagnosisReport.of(diagnosis_report(refit(begin).run))
 
 
@@ -214,6 +217,7 @@ def discover(
     *,
     add: Sequence[str] = (),
     model: File | None = None,
+    offer: Sequence[File] = (),
     watch: Watch | None = None,
 ) -> DiscoveryReport:
     """Add the best effect, fit again, and go on until nothing more is called for.
@@ -224,6 +228,8 @@ def discover(
     ----------
     runs, add, model
         As for :func:`fit`; these effects stay in.
+    offer : sequence of paths, optional
+        Effect files that are candidates beside the catalogue.
     watch : callable, optional
         Told the effects of each model that is looked at.
 
@@ -244,6 +250,6 @@ def discover(
     >>> found.save("model.toml")                                             # doctest: +SKIP
     """
     names = names_of(runs)
-    refit, begin = load_refitter(names, tuple(add), path_of(model), watch)
+    refit, begin = load_refitter(names, tuple(add), path_of(model), watch, paths_of(offer))
     found = discover_run(refit, asked_for(refit, begin, add))
     return DiscoveryReport.of(discovery_report(found), _found=found, _runs=names)

@@ -11,7 +11,7 @@ from app.analysis import load_refitter
 from app.files.pose_table import Pose
 from app.files.poses import full_poses, render_pose_file
 from app.files.runs import outside_runs
-from app.jobs.chosen_runs import File, Runs, at_least, names_of, path_of
+from app.jobs.chosen_runs import File, Runs, at_least, names_of, path_of, paths_of
 from app.jobs.posing import PoseEntry
 from app.jobs.record import Report
 from calib.discover.design import CANDIDATES, FollowUpPlan, design_follow_up
@@ -64,6 +64,7 @@ def design(
     *,
     add: Sequence[str] = (),
     model: File | None = None,
+    offer: Sequence[File] = (),
     candidates: int = CANDIDATES,
     seed: int = 1,
     watch: Callable[[str], None] | None = None,
@@ -78,6 +79,8 @@ def design(
         Two effects; one may be ``"nothing"``: is the other there at all?
     n : int
         How many poses.
+    offer : sequence of paths, optional
+        Effect files; what they hold may be named in ``discriminate``.
     candidates : int
         Reachable poses among which is chosen.
     seed : int
@@ -106,9 +109,13 @@ def design(
     if first == second:
         raise BadInput(f"{first} is named twice", remedy="Name two effects, or 'nothing'")
     names = names_of(runs)
-    refit, begin = load_refitter(names, tuple(add), path_of(model))
+    refit, begin = load_refitter(names, tuple(add), path_of(model), offer=paths_of(offer))
     machine = refit.rows.machine
-    effects = [effect_named(name, machine) for name in discriminate if name != NOTHING]
+    effects = [
+        refit.effects.get(name) or effect_named(name, machine)
+        for name in discriminate
+        if name != NOTHING
+    ]
     if not effects:
         raise BadInput("no effect is named", remedy="Name two effects, or one and 'nothing'")
     plan = design_follow_up(
@@ -124,7 +131,13 @@ def design(
             f"the way to pose {faults[0].end} passes a limit ({faults[0].violation})",
             remedy="Choose among other candidates: --seed",
         )
-    again = {"model": model, "add": tuple(add), "candidates": candidates, "seed": seed}
+    again = {
+        "model": model,
+        "add": tuple(add),
+        "offer": tuple(offer),
+        "candidates": candidates,
+        "seed": seed,
+    }
     said = follow_up_report(plan, discriminate, begin, names)
     return FollowUpReport.of(said, _plan=plan, _again=again)
 
@@ -176,6 +189,7 @@ def _poses_file(plan: FollowUpPlan, report: FollowUpReport, again: Mapping[str, 
     if again["model"] is not None:
         command += f" --model {os.fspath(again['model'])}"
     command += "".join(f" --add {name}" for name in again["add"])
+    command += "".join(f" --offer {os.fspath(file)}" for file in again["offer"])
     if again["candidates"] != CANDIDATES:
         command += f" --candidates {again['candidates']}"
     command += f" --n {plan.poses.count} --seed {again['seed']}"

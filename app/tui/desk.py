@@ -67,6 +67,7 @@ class Desk:
         self._not_while_busy("change the site")
         await self.disconnect()
         self.site = site
+        self.study.offers = site.offers
         self.station = Station(site)
         self.station.observers.watch(self._hear)
         self.picture.write(f"site {site.title or site.source}")

@@ -1,13 +1,15 @@
 """The discovery of one analysis: which effects are in the model, and how the error fell."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from app.analysis import load_rows
+from app.files.models import offered_effects
 from calib.discover.compare import compare_fit
 from calib.discover.compare_report import compare_report
 from calib.discover.diagnosis import RunDiagnosis
@@ -54,11 +56,14 @@ class Search:
     view: View | None = None
 
     @staticmethod
-    def of(runs: tuple[str, ...], effects: tuple[str, ...] = ()) -> "Search":
-        """Load runs and look at the model with these effects."""
+    def of(
+        runs: tuple[str, ...], effects: tuple[str, ...] = (), offers: Sequence[Path] = ()
+    ) -> "Search":
+        """Load runs and look at the model with these effects; ``offers`` are candidates too."""
         rows, chosen = load_rows(runs, effects)
         # What the record itself shows is in the model from the start.
-        known = {effect.id: effect for effect in (*catalogue(rows.machine), *chosen)}
+        candidates = (*catalogue(rows.machine), *offered_effects(offers, chosen), *chosen)
+        known = {effect.id: effect for effect in candidates}
         search = Search(runs, Refitter(rows, tuple(known.values())))
         names = tuple(effect.id for effect in chosen)
         search._climb("start", names)

@@ -31,6 +31,8 @@ class Study:
         self.effects: tuple[str, ...] = ()
         self.answer: FitAnswer | None = None
         self.search: Search | None = None
+        self.offers: tuple[Path, ...] = ()
+        """Effect files of the site: candidates beside the catalogue."""
 
     def choose(self, runs: tuple[str, ...]) -> None:
         """Study other runs; what was found in the last ones is put aside."""
@@ -82,12 +84,12 @@ class Study:
     async def diagnose(self) -> None:
         """Ask what the model of the chosen runs misses, with the effects that are in it."""
         runs = self._chosen()
-        effects = self.effects
+        effects, offers = self.effects, self.offers
 
         def work() -> "Search":
             from app.tui.discovering import Search
 
-            return Search.of(runs, effects)
+            return Search.of(runs, effects, offers)
 
         self.search = await self._think(work)
         self._tell_stair(self.search)

@@ -10,7 +10,7 @@ import click
 import numpy as np
 
 from app import answer
-from app.analysis_options import model_options
+from app.analysis_options import model_options, offer_options, offers
 from app.files.runs import outside_runs
 from app.jobs.following_up import design
 from calib.discover.design import CANDIDATES
@@ -30,6 +30,7 @@ from calib.discover.design import CANDIDATES
 @click.option("--seed", default=1, show_default=True, help="Seed of the reachable candidates.")
 @click.option("--out", type=click.Path(path_type=Path), help="Write a poses file for measure.")
 @model_options
+@offer_options
 @answer.json_option
 def command(
     runs: tuple[str, ...],
@@ -40,6 +41,8 @@ def command(
     out: Path | None,
     add: tuple[str, ...],
     model: Path | None,
+    offer: tuple[Path, ...],
+    site: Path | None,
     as_json: bool,
 ) -> None:
     """Choose the poses, their order, load and temperature that tell effect A from effect B.
@@ -55,6 +58,7 @@ def command(
         count,
         add=add,
         model=model,
+        offer=offers(offer, site),
         candidates=candidates,
         seed=seed,
         watch=lambda condition: answer.say(f"choosing {count} poses, {condition} ..."),

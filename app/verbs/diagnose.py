@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from app import answer
-from app.analysis_options import model_options, watcher
+from app.analysis_options import model_options, offer_options, offers, watcher
 from app.jobs.discovering import diagnose
 from app.show.record_words import excluded_lines, record_lines
 
@@ -17,15 +17,24 @@ from app.show.record_words import excluded_lines, record_lines
 @click.command()
 @click.argument("runs", nargs=-1, required=True, metavar="RUN...")
 @model_options
+@offer_options
 @answer.json_option
-def command(runs: tuple[str, ...], add: tuple[str, ...], model: Path | None, as_json: bool) -> None:
+def command(
+    runs: tuple[str, ...],
+    add: tuple[str, ...],
+    model: Path | None,
+    offer: tuple[Path, ...],
+    site: Path | None,
+    as_json: bool,
+) -> None:
     """Score every known effect against what the model leaves of RUN...
 
     The answer says which effect is missing, how sure that is, how large it is and what adding it
     would bring; or that nothing is missing; or that something unknown is.
     """
     with answer.working("testing every known effect"):
-        report = diagnose(runs, add=add, model=model, watch=watcher()).to_json()
+        asked = diagnose(runs, add=add, model=model, offer=offers(offer, site), watch=watcher())
+    report = asked.to_json()
     answer.show(report, as_json, words(report))
 
 

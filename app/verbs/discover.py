@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from app import answer
-from app.analysis_options import model_options, watcher
+from app.analysis_options import model_options, offer_options, offers, watcher
 from app.files.runs import outside_runs
 from app.jobs.discovering import discover
 from app.show.record_words import record_lines
@@ -19,6 +19,7 @@ from app.verbs.diagnose import bad_lines, not_asked, sizes, um
 @click.command()
 @click.argument("runs", nargs=-1, required=True, metavar="RUN...")
 @model_options
+@offer_options
 @click.option(
     "--save", type=click.Path(path_type=Path), help="Write the model with what was found to FILE."
 )
@@ -27,6 +28,8 @@ def command(
     runs: tuple[str, ...],
     add: tuple[str, ...],
     model: Path | None,
+    offer: tuple[Path, ...],
+    site: Path | None,
     save: Path | None,
     as_json: bool,
 ) -> None:
@@ -36,7 +39,7 @@ def command(
     """
     outside_runs(save, runs)
     with answer.working("looking for effects, adding the best, fitting again"):
-        found = discover(runs, add=add, model=model, watch=watcher())
+        found = discover(runs, add=add, model=model, offer=offers(offer, site), watch=watcher())
     if save is not None:
         found.save(save)
         answer.say(f"model written to {save}")

@@ -18,9 +18,10 @@ SIGNATURES = {
     "compare": "runs, *, add=(), model=None, propose=None, watch=None",
     "correct": "model, poses, *, machine=None, payload=None, temperature=None, channels=None, "
     "every=None, before=None, extrapolate=False",
-    "design": "runs, discriminate, n=10, *, add=(), model=None, candidates=250, seed=1, watch=None",
-    "diagnose": "runs, *, add=(), model=None, watch=None",
-    "discover": "runs, *, add=(), model=None, watch=None",
+    "design": "runs, discriminate, n=10, *, add=(), model=None, offer=(), candidates=250, seed=1, "
+    "watch=None",
+    "diagnose": "runs, *, add=(), model=None, offer=(), watch=None",
+    "discover": "runs, *, add=(), model=None, offer=(), watch=None",
     "fit": "runs, *, add=(), model=None",
     "load_machine": "name_or_path, relative_to=None",
     "load_runs": "runs",

@@ -63,3 +63,25 @@ def test_every_path_of_a_site_holds_from_the_folder_of_a_session(tmp_path: Path)
     assert copied.controller == site.controller
     assert copied.controller.store == str(tmp_path / "s")
     assert str(tmp_path / "a.eds") in str(copied.controller.settings["eds"])
+
+
+EFFECT = """
+[effect]
+id = "cable"
+says = "a cable pulls where a leg is long"
+acts_on = "actuator"
+expression = "k * s**2 * direction"
+unknowns = { k = "1/mm" }
+"""
+
+
+def test_a_site_offers_effects_that_are_read_before_anything_is_measured(tmp_path: Path) -> None:
+    file = tmp_path / "cable.toml"
+    file.write_text(EFFECT, encoding="utf-8")
+    offering = f'{site_text()}\n[effects]\noffer = ["cable.toml"]\n'
+    site = parse_site(offering, "site.toml", tmp_path)
+    assert site.offers == (file.resolve(),)
+    assert parse_site(site.to_toml(), "copy", tmp_path / "elsewhere").offers == site.offers
+    file.write_text(EFFECT.replace("s**2", "s**"), encoding="utf-8")
+    with pytest.raises(BadInput, match="column"):
+        parse_site(offering, "site.toml", tmp_path)
