@@ -10,6 +10,7 @@ beside it. The judge's view exists on a mock only: the noise-free truth.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -28,11 +29,23 @@ from calib.frames import Frame, fit_frame
 from calib.mechanism.rigid import Poses
 from calib.mechanism.solve import inverse
 from calib.mechanism.task import FULL
-from calib.pose_error import SeenPoints, Summary, noise_peaks, pose_errors, summary
+from calib.pose_error import (
+    ErrorCovariance,
+    SeenPoints,
+    Summary,
+    error_covariance,
+    noise_peaks,
+    pose_errors,
+    summary,
+)
 
 FORMAT = "pkm-verification/1"
 REFERENCE_EVERY = 40
 """Poses between two looks at the base nests."""
+COVERAGE = 2.0
+"""Coverage factor of expanded uncertainties: about 95 %."""
+AXES = ("x", "y", "z", "rx", "ry", "rz")
+MOVED, TURNED = slice(0, 3), slice(3, 6)
 PAPER = {"position_peak_um": 12.0, "orientation_peak_deg": 0.0051}
 """Han et al. 2020, Table 6, measured after calibration."""
 
@@ -52,6 +65,8 @@ class Verification:
     noise_peak_deg: float
     truth_position_mm: Array | None
     truth_rotation_rad: Array | None
+    spread: ErrorCovariance | None = None
+    """What the readings' own uncertainty leaves open of the errors; None where nobody asked."""
 
     @property
     def measured(self) -> Summary:
@@ -78,15 +93,71 @@ class Verification:
             },
             "truth": vars(truth) if truth else None,
             "paper": PAPER,
-            "errors": [
-                {
-                    "pose": label,
-                    "position_um": [1e3 * float(v) for v in self.position_mm[:, k]],
-                    "rotation_deg": [float(np.rad2deg(v)) for v in self.rotation_rad[:, k]],
-                }
-                for k, label in enumerate(self.labels)
-            ],
+            "expanded": self._expanded(),
+            "axes": self._axes(),
+            "errors": [self._error(k) for k in range(len(self.labels))],
         }
+
+    def _error(self, k: int) -> dict[str, Any]:
+        """One pose: errors in base axes, and expanded uncertainties in the worst direction."""
+        return {
+            "pose": self.labels[k],
+            "position_um": [1e3 * float(v) for v in self.position_mm[:, k]],
+            "rotation_deg": [float(np.rad2deg(v)) for v in self.rotation_rad[:, k]],
+            "position_u_um": None if self._widest is None else 1e3 * float(self._widest[0][k]),
+            "rotation_u_deg": (
+                None if self._widest is None else float(np.rad2deg(self._widest[1][k]))
+            ),
+        }
+
+    @cached_property
+    def _widest(self) -> tuple[Array, Array] | None:
+        """Expanded uncertainty of every pose in its worst direction: mm, rad."""
+        if self.spread is None:
+            return None
+        return COVERAGE * self.spread.widest(MOVED), COVERAGE * self.spread.widest(TURNED)
+
+    def _expanded(self) -> dict[str, float] | None:
+        """Expanded uncertainties of peak and RMS, from what the tracker states of each reading."""
+        if self.spread is None or self._widest is None:
+            return None
+        found: dict[str, float] = {"k": COVERAGE}
+        parts = (
+            ("position", "um", 1e3, self.position_mm, MOVED),
+            ("orientation", "deg", float(np.rad2deg(1.0)), self.rotation_rad, TURNED),
+        )
+        for (name, unit, scale, error, part), widest in zip(parts, self._widest, strict=True):
+            norm = np.linalg.norm(error, axis=0)
+            rms = float(np.sqrt(np.mean(norm**2)))
+            weights = np.zeros((norm.size, 6))
+            weights[:, part] = error.T / max(norm.size * rms, np.finfo(float).tiny)
+            found[f"{name}_peak_{unit}"] = scale * float(widest[np.argmax(norm)])
+            found[f"{name}_rms_{unit}"] = scale * COVERAGE * self.spread.of(weights)
+        return found
+
+    def _axes(self) -> list[dict[str, Any]]:
+        """Mean, standard deviation and largest error along each base axis."""
+        errors = np.vstack([1e3 * self.position_mm, np.rad2deg(self.rotation_rad)])
+        scale = np.repeat([1e3, np.rad2deg(1.0)], 3)
+        count = len(self.labels)
+        found: list[dict[str, Any]] = []
+        for row, (axis, error) in enumerate(zip(AXES, errors, strict=True)):
+            weights = np.zeros((count, 6))
+            weights[:, row] = 1.0 / count
+            u_mean = None
+            if self.spread is not None:
+                u_mean = COVERAGE * float(scale[row]) * self.spread.of(weights)
+            found.append(
+                {
+                    "axis": axis,
+                    "unit": "um" if row < 3 else "deg",
+                    "mean": float(error.mean()),
+                    "std": float(error.std()),
+                    "largest": float(error[np.argmax(np.abs(error))]),
+                    "u_mean": u_mean,
+                }
+            )
+        return found
 
 
 def verification_plan(
@@ -142,8 +213,9 @@ def judge(site: Site, plan: Plan, journal: Journal) -> Verification:
     poses = list(zip(wanted, points, strict=True))
     peak_mm, peak_rad = noise_peaks(frame, base, poses, np.random.default_rng(len(labels)))
     truth = _truth(plan, journal, labels, wanted)
+    spread = error_covariance(frame, base, poses)
     return Verification(
-        labels, position, rotation, 1e3 * peak_mm, float(np.rad2deg(peak_rad)), *truth
+        labels, position, rotation, 1e3 * peak_mm, float(np.rad2deg(peak_rad)), *truth, spread
     )
 
 

@@ -103,3 +103,71 @@ def _fit_errors(frame: Frame, seen: SeenPoints, generator: np.random.Generator) 
         noise.append(root @ generator.standard_normal((3, TRIALS)))
     errors: Array = np.linalg.pinv(np.vstack(blocks)) @ np.vstack(noise)
     return errors
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorCovariance:
+    """What the readings' own uncertainty leaves open of the errors (6, N) of all poses.
+
+    Attributes
+    ----------
+    own : (N, 6, 6)
+        Of each pose's rigid fit: shift in mm, rotation vector in rad, base axes.
+    lever : (N, 6, 6)
+        How an error of the base frame shows in each pose's error.
+    common : (6, 6)
+        Of the base frame, which all poses share.
+    """
+
+    own: Array
+    lever: Array
+    common: Array
+
+    @property
+    def each(self) -> Array:
+        """Covariance of every pose's error, (N, 6, 6)."""
+        shared: Array = self.lever @ self.common @ np.swapaxes(self.lever, 1, 2)
+        return self.own + shared
+
+    def of(self, weights: Array) -> float:
+        """Standard uncertainty of the sum of all errors times ``weights`` (N, 6)."""
+        alone = np.einsum("ni,nij,nj->", weights, self.own, weights)
+        shared = np.einsum("nij,ni->j", self.lever, weights)
+        return float(np.sqrt(alone + shared @ self.common @ shared))
+
+    def widest(self, part: slice) -> Array:
+        """Standard uncertainty (N,) in the direction that is known worst; ``part``: which three."""
+        found: Array = np.sqrt(np.linalg.eigvalsh(self.each[:, part, part])[:, -1])
+        return found
+
+
+def error_covariance(
+    base: Frame, base_seen: SeenPoints, poses: Sequence[tuple[Frame, SeenPoints]]
+) -> ErrorCovariance:
+    """Covariance of pose errors by linearised rigid fits; arguments as of :func:`noise_peaks`."""
+    back = base.rotation.T
+    lever = np.tile(-np.eye(6), (len(poses), 1, 1))
+    for matrix, (pose, _) in zip(lever, poses, strict=True):
+        matrix[:3, 3:] = _turning(pose.translation)
+    return ErrorCovariance(
+        np.array([_fit_covariance(base.after(pose), seen, back) for pose, seen in poses]),
+        lever,
+        _fit_covariance(base, base_seen, back),
+    )
+
+
+def _fit_covariance(frame: Frame, seen: SeenPoints, back: Array) -> Array:
+    """Covariance (6, 6) of a rigid fit's shift and turn, in the axes to which ``back`` turns."""
+    rows, spread = [], np.zeros((3 * len(seen.covariance),) * 2)
+    for k, (point, covariance) in enumerate(zip(seen.local.T, seen.covariance, strict=True)):
+        rows.append(np.hstack([np.eye(3), -_turning(frame.rotation @ point)]))
+        spread[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = covariance
+    solve = np.kron(np.eye(2), back) @ np.linalg.pinv(np.vstack(rows))
+    found: Array = solve @ spread @ solve.T
+    return found
+
+
+def _turning(vector: Array) -> Array:
+    """Matrix (3, 3) of the cross product with a vector (3,) from the left."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

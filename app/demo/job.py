@@ -14,7 +14,7 @@ from app.files.models import write_model
 from app.files.pose_table import Pose
 from app.files.poses import full_poses, nest_matrix, render_design
 from app.files.site import Site, load_site
-from app.report.build import write_report
+from app.report.build import Asked, write_report
 from app.session import PlanOptions, Session, measure_plan
 from app.session import events as ev
 from app.session.plans import order_for
@@ -35,7 +35,7 @@ STEPS = (
     ("fit", "fit: identify the parameters"),
     ("apply", "apply: snapshot, write, read back, check, store"),
     ("after", "verify: the same poses again"),
-    ("report", "report: one page"),
+    ("report", "report: the calibration record"),
 )
 READING_SIGMA_MM = 0.004
 CANDIDATES = 2500
@@ -222,12 +222,12 @@ class Demo:
     def _report(self, run_folder: Path) -> Path:
         self.watcher.begins("report")
         path = self.folder / "report.html"
-        write_report(
-            (str(run_folder),),
+        asked = Asked(
+            add=self.add,
             before=self.folder / "before.json",
             after=self.folder / "after.json",
-            title="Demonstration: a mock hexapod calibrated",
-            out=path,
+            title="Demonstration: a mock calibrated",
         )
+        write_report((str(run_folder),), asked, (path, path.with_suffix(".pdf")))
         self.watcher.ends("report", str(path))
         return path

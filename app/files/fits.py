@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from app.files.staircase import Way, read_way
 from app.files.text import read_text
 from calib.arrays import Array
 from calib.command.region import Region
@@ -55,6 +56,10 @@ class SavedFit:
     """What the machine carried in the last run."""
     region: Region | None = None
     """Where it was measured; None if the file is silent."""
+    runs: tuple[str, ...] = ()
+    """Points files of the runs."""
+    way: Way = field(default_factory=Way)
+    """How it was found, where that was kept."""
 
     def covariance_of(self, names: list[str]) -> Array:
         """Covariance of some parameters, in that order."""
@@ -103,6 +108,8 @@ def fit_of(top: TomlTable, source: str) -> SavedFit:
         controller=top.numbers_by_name("controller"),
         load=load_of(top.table("load", required=False)) if top.has("load") else None,
         region=_region(top.table("measured")) if top.has("measured") else None,
+        runs=tuple(top.texts("runs")),
+        way=read_way(top),
     )
 
 

@@ -13,6 +13,7 @@ import tomli_w
 
 from app.files.fits import MODEL_FORMAT, read_fit, region_table
 from app.files.machines import shipped_machines
+from app.files.staircase import Way, way_tables
 from app.files.text import read_text
 from calib.command import Region
 from calib.effects import Effect, effect_named, is_shipped
@@ -51,8 +52,8 @@ def controller_serial(fit: Fit) -> str:
     return serials.pop() if len(serials) == 1 else ""
 
 
-def write_model(path: Path, fit: Fit) -> None:
-    """Write what a fit found, correlations included."""
+def write_model(path: Path, fit: Fit, way: Way = Way()) -> None:  # noqa: B008 - frozen
+    """Write what a fit found, correlations included, and the way on which it was found."""
     report = fit_report(fit)
     sigma = fit.sigmas
     correlation = fit.covariance / (sigma[:, None] * sigma)
@@ -80,6 +81,7 @@ def write_model(path: Path, fit: Fit) -> None:
             for entry in report["parameters"]
         ],
         "masked": report["bad_readings"],
+        **way_tables(way),
         "controller": dict(last.controller_parameters),
         **({} if last.load is None else {"load": _load_table(last.load)}),
         "measured": region_table(Region.of_fit(fit)),

@@ -14,6 +14,7 @@ import tomli_w
 from app.devices import Role, kind_named, kind_names
 from app.files.device_settings import read_address, read_settings
 from app.files.machines import load_machine
+from app.files.record_details import FILES, RecordDetails, record_details
 from app.files.text import read_text
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
@@ -126,6 +127,7 @@ class Site:
     offers: tuple[Path, ...] = ()
     """Effect files that discovery has as candidates beside the catalogue."""
     controller_parameters: Mapping[str, float] = field(default_factory=dict)
+    record: RecordDetails = field(default_factory=RecordDetails)
 
     def to_toml(self) -> str:
         """Render the site as a file that stands alone, for the session's folder."""
@@ -171,6 +173,7 @@ def site_of(top: TomlTable, source: str, folder: Path) -> Site:
         limits=_limits(top.table("limits", required=False)),
         clock_scale=_clock(top.table("clock", required=False)),
         offers=_offers(top.table("effects", required=False), folder),
+        record=record_details(top.table("record", required=False), folder),
     )
     nests.end()
     top.end()
@@ -186,6 +189,11 @@ def _standing_alone(top: TomlTable, machine_name: str, folder: Path) -> dict[str
     if isinstance(offered := data.get("effects"), dict) and "offer" in offered:
         files = [str((folder / str(name)).resolve()) for name in offered["offer"]]
         data["effects"] = {**offered, "offer": files}
+    if isinstance(record := data.get("record"), dict):
+        data["record"] = {
+            name: str((folder / text).resolve()) if name in FILES and text else text
+            for name, text in record.items()
+        }
     roles: tuple[Role, ...] = ("controller", "tracker")
     for role in roles:
         if isinstance(own := data.get(role), dict) and isinstance(own.get("kind"), str):

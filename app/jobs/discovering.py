@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from app.analysis import asked_for, load_refitter
+from app.files.staircase import way_of_discovery
 from app.jobs.chosen_runs import File, Runs, names_of, path_of, paths_of
 from app.jobs.fitting import BadReadingEntry, RemarkEntry, keep_model
 from app.jobs.record import Record, Report
@@ -171,7 +172,8 @@ class DiscoveryReport(Report):
 
     def save(self, file: File) -> None:
         """Write a model file with what was found, as :meth:`FitReport.save`."""
-        keep_model(file, stage_of(self._found).run.fit, self._runs)
+        way = way_of_discovery(self.to_json())
+        keep_model(file, stage_of(self._found).run.fit, self._runs, way)
 
 
 def diagnose(

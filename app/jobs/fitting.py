@@ -7,6 +7,7 @@ from typing import ClassVar
 from app.analysis import load_rows
 from app.files.models import write_model
 from app.files.runs import outside_runs
+from app.files.staircase import Way
 from app.jobs.chosen_runs import File, Runs, names_of, path_of
 from app.jobs.record import Record, Report
 from calib.discover.agreement import runs_at_odds
@@ -145,9 +146,9 @@ def fit(runs: Runs, *, add: Sequence[str] = (), model: File | None = None) -> Fi
     return FitReport.of(said, _fit=found, _runs=names)
 
 
-def keep_model(file: File, found: Fit, runs: tuple[str, ...]) -> None:
+def keep_model(file: File, found: Fit, runs: tuple[str, ...], way: Way | None = None) -> None:
     """Write a model file beside the runs, never into one."""
     path = path_of(file)
     assert path is not None
     outside_runs(path, runs)
-    write_model(path, found)
+    write_model(path, found, way or Way())

@@ -41,11 +41,42 @@ class PeaksEntry(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class PoseErrorEntry(Record):
-    """Error of one pose in base axes: (3,) um and (3,) deg."""
+    """Error of one pose in base axes: (3,) um and (3,) deg.
+
+    ``position_u_um`` and ``rotation_u_deg``: expanded uncertainties (k = 2), worst direction.
+    """
 
     pose: str
     position_um: tuple[float, ...]
     rotation_deg: tuple[float, ...]
+    position_u_um: float | None
+    rotation_u_deg: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExpandedEntry(Record):
+    """Expanded uncertainties (coverage factor ``k``) by what the tracker states of its readings."""
+
+    k: float
+    position_peak_um: float
+    position_rms_um: float
+    orientation_peak_deg: float
+    orientation_rms_deg: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class AxisEntry(Record):
+    """Errors along, or about, one base axis over all poses, in ``unit``.
+
+    ``largest`` with its sign; ``u_mean``: expanded uncertainty (k = 2) of the mean.
+    """
+
+    axis: str
+    unit: str
+    mean: float
+    std: float
+    largest: float
+    u_mean: float | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,6 +102,8 @@ class VerificationReport(Report):
     noise_alone: PeaksEntry
     truth: ErrorsEntry | None
     paper: PeaksEntry
+    expanded: ExpandedEntry | None
+    axes: tuple[AxisEntry, ...]
     errors: tuple[PoseErrorEntry, ...]
     session: str
     before: BeforeEntry | None

@@ -90,3 +90,5 @@ def command(
     answer.say(f"session {session.folder}")
     report = session_report(asyncio.run(run_on_console(session, quiet=as_json)))
     answer.show(report.to_json(), as_json, f"{report.readings} readings in {report.run}")
+    if not as_json:
+        answer.say(f"when all is done, the calibration record: pkmcal report {report.run}")

@@ -10,6 +10,7 @@ from app import answer
 from app.console import run_on_console, unattended
 from app.files.site import load_site
 from app.jobs.verifying import begin_verifying, read_before, verification_report
+from app.report.sources import run_before
 from app.verification import REFERENCE_EVERY
 
 
@@ -82,6 +83,8 @@ def command(
         report.save(save_file)
     found = report.to_json()
     answer.show(found, as_json, words(found))
+    if not as_json and (run := run_before(session.folder)) is not None:
+        answer.say(f"the calibration record: pkmcal report {run}")
 
 
 def words(found: dict[str, Any]) -> str:

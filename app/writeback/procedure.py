@@ -14,6 +14,7 @@ from app.errors import GateRefused, StoppedByOperator
 from app.files.fits import SavedFit
 from app.files.pose_table import Pose
 from app.files.site import Site
+from app.history.store import Entry, History
 from app.hosted.parameters import ParameterSet
 from app.session.events import GateChecked, Stage, WriteBackStage
 from app.session.known import Held, Snapshot, compare_with_known
@@ -24,6 +25,7 @@ from app.verification import Verification, judge
 from app.writeback.gates import Gates, HostedSets, gates_of_check, gates_of_proposal, refuse_if_any
 from app.writeback.proposal import Proposal, propose
 from app.writeback.transfer import Wanted, keep, prove, snapshots_of, write_volatile
+from calib.errors import BadInput
 from calib.pose_error import Summary
 from calib.poses import verification_poses
 from drivers.errors import DeviceError, ParameterError, Refused
@@ -137,9 +139,18 @@ class WriteBack:
         kept = snapshots.save(kept_set, f"applied {Path(self.fit.source).name}")
         snapshots.expect(kept_set)
         self._stage("done", f"kept as set {kept.number}; the way back: undo --to {snapshot.number}")
-        return Applied(
+        applied = Applied(
             snapshot, kept, proposal, before.measured, after.measured, after.noise_peak_um
         )
+        self._remember(applied)
+        return applied
+
+    def _remember(self, applied: Applied) -> None:
+        """Add what was stored to the history; the set is in the controller, whatever comes here."""
+        try:
+            History(self.root).add(applied_entry(self.station.site, self.fit, applied))
+        except BadInput as error:
+            self._stage("done", f"it is not in the history: {error}")
 
     async def stop(self) -> None:
         """Stop a measurement of check poses; :meth:`run` then restores and ends."""
@@ -197,6 +208,27 @@ class WriteBack:
         if self._stopping:
             raise StoppedByOperator(f'stopped before "{stage}"')
         self.station.observers.tell(WriteBackStage(stage, says))
+
+
+def applied_entry(site: Site, fit: SavedFit, applied: Applied) -> Entry:
+    """What was stored, for the history."""
+    kept, proposal = applied.kept, applied.proposal
+    said = {
+        "set": kept.number,
+        "way_back": applied.snapshot.number,
+        "checksum": kept.checksum,
+        "held": len(kept.values),
+        "runs": list(fit.runs),
+        "effects": list(fit.effects),
+        "parameters": [vars(change) for change in proposal.changes],
+        "left_out": dict(proposal.left_out),
+        "given_up": list(proposal.given_up),
+        "check_before": vars(applied.before),
+        "check_after": vars(applied.after),
+        "noise_peak_um": applied.noise_peak_um,
+    }
+    machine, serial = site.machine.name, kept.identity.serial
+    return Entry("applied", kept.taken_utc, machine, serial, fit.source, said)
 
 
 def judged(

@@ -19,6 +19,7 @@ from app.files.models import write_model
 from app.files.poses import pose_file_of, read_any_poses
 from app.files.runs import read_run
 from app.files.site import site_of
+from app.files.staircase import StairStep, Way
 from calib.errors import BadInput
 from calib.identify import fit
 from calib.model import Model
@@ -141,10 +142,11 @@ def test_a_key_may_be_left_out_where_the_page_says_so(name) -> None:
 def test_model_files_are_written_with_the_keys_of_the_page(tmp_path) -> None:
     loaded = read_run(RUNS / "no-effect")
     path = tmp_path / "model.toml"
-    write_model(path, fit(Model(stack(loaded.machine, [loaded.run]))))
+    way = Way((StairStep(did="start"),), (("gravity-sag", "leg-compliance"),))
+    write_model(path, fit(Model(stack(loaded.machine, [loaded.run]))), way)
     written = tomllib.loads(path.read_text())
     top = {key.split(".")[0] for key, *_ in rows("model-file", "key")}
-    assert set(written) == top | {"runs", "masked"}
+    assert set(written) == top | {"masked"}
     entry = {key.split(".")[1] for key, *_ in rows("model-file", "key") if "parameters." in key}
     assert set(written["parameters"][0]) == entry | {"nominal"}
     for key in ("runs", "masked", "parameters.nominal"):

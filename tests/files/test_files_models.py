@@ -1,14 +1,17 @@
 """A model file is read by one reader whatever verb reads it, and its faults have a line."""
 
 import json
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
+import tomli_w
 
 from app.files.fits import parse_fit, read_fit
 from app.files.machines import load_machine
 from app.files.models import chosen_effects
+from app.files.staircase import StairStep, Way, way_tables
 from calib.errors import BadInput
 
 OWN = """[effect]
@@ -112,3 +115,14 @@ def test_a_fault_is_named_with_its_line(old: str, new: str, line: int, what: str
 def test_what_is_no_model_file_ends_in_words(text: str) -> None:
     with pytest.raises(BadInput, match=r"m\.toml"):
         parse_fit(text, "m.toml")
+
+
+def test_the_way_to_a_model_goes_round() -> None:
+    steps = (
+        StairStep(did="start", rms_um=14.2),
+        StairStep(did="+ backlash", rms_um=8.9, p_value=1e-12, rivals=("hysteresis",)),
+    )
+    way = Way(steps, (("gravity-sag", "leg-compliance"),))
+    text = tomli_w.dumps({**tomllib.loads(MODEL), **way_tables(way)})
+    assert parse_fit(text, "model.toml").way == way
+    assert parse_fit(MODEL, "model.toml").way == Way()

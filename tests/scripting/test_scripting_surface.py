@@ -68,7 +68,9 @@ FIELDS = {
     "SetsReport": "sets unknown",
     "SimulationReport": "machine run truth seed poses readings hidden",
     "UndoReport": "restored",
-    "VerificationReport": "poses measured noise_alone truth paper errors session before",
+    "VerificationReport": (
+        "poses measured noise_alone truth paper expanded axes errors session before"
+    ),
 }
 ERRORS = {"BadInput", "DeviceError", "GateRefused", "NameTaken", "StoppedByOperator"}
 

@@ -85,3 +85,22 @@ def test_a_site_offers_effects_that_are_read_before_anything_is_measured(tmp_pat
     file.write_text(EFFECT.replace("s**2", "s**"), encoding="utf-8")
     with pytest.raises(BadInput, match="column"):
         parse_site(offering, "site.toml", tmp_path)
+
+
+def test_the_record_names_a_wrong_day_and_a_missing_logo(tmp_path: Path) -> None:
+    text = site_text() + '\n[record]\ncustomer = "C"\n'
+    assert parse_site(text, "site.toml", tmp_path).record.customer == "C"
+    for wrong, said in (
+        ('tracker_calibrated = "14.3.2026"', "no day"),
+        ('logo = "l.svg"', "no file"),
+    ):
+        with pytest.raises(BadInput, match=said) as fault:
+            parse_site(text + wrong, "site.toml", tmp_path)
+        assert wrong.split()[0] in fault.value.place
+
+
+def test_paths_of_the_record_hold_from_everywhere(tmp_path: Path) -> None:
+    (tmp_path / "l.svg").write_text("<svg/>")
+    site = parse_site(site_text() + '\n[record]\nlogo = "l.svg"\n', "site.toml", tmp_path)
+    again = parse_site(site.to_toml(), "copy", tmp_path / "elsewhere")
+    assert again.record.logo == str((tmp_path / "l.svg").resolve())
