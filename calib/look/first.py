@@ -9,6 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from calib.arrays import Array
+from calib.look.clock import clock
+from calib.look.digits import rounding
 from calib.look.labels import any_labels, mirrored_table, other_labels
 from calib.look.load import load_and_payload
 from calib.look.misfit import look_at_misfit
@@ -49,7 +51,7 @@ def first_look(machine: Machine, runs: Sequence[Run]) -> Rows:
     known: _Known = {}
     for run in runs:
         check_travel(machine, run)
-        run, of_rows = _rows_alone(machine, run)
+        run, of_rows = rows_alone(machine, run)
         parts, of_places, shown = _places(machine, run)
         if shown and len(runs) > 1:
             parts = _parted(machine, run)
@@ -65,11 +67,14 @@ def first_look(machine: Machine, runs: Sequence[Run]) -> Rows:
     return replace(stack(machine, looked), remarks=tuple(remarks), known=known)
 
 
-def _rows_alone(machine: Machine, run: Run) -> tuple[Run, list[Remark]]:
-    """What the rows tell by themselves."""
+def rows_alone(machine: Machine, run: Run) -> tuple[Run, list[Remark]]:
+    """What the rows tell by themselves: the run as they are meant, and what is said of it."""
     looked, remarks = no_measurements(run)
     if not looked.measured.any():
         return run, remarks  # the fit says that there is nothing
+    for look in (clock, rounding):
+        looked, found = look(looked)
+        remarks += found
     looked, found = temperatures(looked)
     remarks += found
     looked, found = load_and_payload(looked)

@@ -1,10 +1,7 @@
 """What a fit leaves, asked of the record: a unit of the uncertainties, a step, a seat.
 
 These are smaller than what the drawing's machine alone can show (a station moved by 0.2 mm, an
-SMR 0.3 mm higher), so the fitted geometry is projected out: with the whitened Jacobian J of the fit
-and its covariance C, columns A have the weight V = A A^T - A J^T C J A^T and the scores s = A e;
-freeing them lowers chi-square by s^T V^-1 s. All moments are tried: sums over the readings from
-one on.
+SMR 0.3 mm higher), so the fitted geometry is projected out.
 """
 
 from collections.abc import Mapping
@@ -19,16 +16,19 @@ from calib.effects.tracker import rigid_motions
 from calib.errors import BadInput
 from calib.identify.fitting import Fit
 from calib.identify.staged import fit_effects
+from calib.look.scan import excess, prior_cost, scan, whitened, with_the_excluded
 from calib.look.seats import ALONG, lifted, normal_of, seated
+from calib.look.sigmas import sigmas_of_all
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import rotate
 from calib.runs.record import Run
 from calib.runs.remark import Remark, ranges
 from calib.runs.stack import stack
-from calib.scaled import Scaled, normal_matrix
 
 LOUD = 2.0
 """Chi-square per degree of freedom from which on the record itself is in question."""
+BENT = 2.5
+"""Cost of the priors a parameter from which on the geometry was bent to fit the record."""
 FALL = 100.0
 """Least fall of chi-square by which a step or a seat is held."""
 SHARE = 0.6
@@ -41,12 +41,8 @@ LEAST = 3
 """Readings on either side of a step."""
 SMALLEST_SEAT = 0.3
 """Offset of a nest, mm, below which it is a matter of the effect nest-offset."""
-TOO_QUIET = 0.3
-"""Scatter over stated sigmas below which these may be another unit."""
 LOUDEST = 100.0
 """Chi-square per degree of freedom that physics may leave where the unit is right."""
-ABSURD_MM = 0.3
-"""Stated sigma, mm, that no laser tracker has."""
 _Known = Mapping[str, Array]
 
 
@@ -68,15 +64,16 @@ def look_at_misfit(
     if fitted is None or not fitted.dof > 0:
         return [run], [], {}
     if len(fitted.bad) > LEAST:
-        fitted = _with_the_excluded(fitted)
+        fitted = with_the_excluded(fitted)
     scatter = float(np.sqrt(fitted.chi2_per_dof))
     sigma = float(np.median(np.sqrt(np.einsum("iin->in", fitted.model.rows.covariance))))
-    if scatter < TOO_QUIET and sigma > ABSURD_MM:
-        in_um = replace(run, covariance=1e-6 * run.covariance)
-        again = _fit(machine, in_um, known)
+    unit = sigmas_of_all(run, sigma, scatter)
+    if unit is not None:
+        again = _fit(machine, unit.run, known)
         if again is not None and again.chi2_per_dof < LOUDEST:
-            return [in_um], [_in_um(run, sigma, scatter)], {}
-    if fitted.chi2_per_dof < LOUD or known:
+            return [unit.run], [unit.remark], {}
+    bent = prior_cost(fitted) > BENT * fitted.model.free.size
+    if known or (fitted.chi2_per_dof < LOUD and not bent):
         return [run], [], {}
     found = _step(fitted) if alone else None
     seat = _seat(fitted)
@@ -95,76 +92,6 @@ def _fit(machine: Machine, run: Run, known: _Known) -> Fit | None:
         return None  # the fit that was asked for says it
 
 
-def _with_the_excluded(fitted: Fit) -> Fit:
-    """The fit as it would be of all readings, to first order: a step passes for so many strays."""
-    accepted = fitted.model.usable.copy()
-    precision = fitted.prior_precision
-    jacobian, whitened = fitted.linear.jacobian, fitted.linear.whitened
-    flat = jacobian[:, :, accepted].reshape(precision.size, -1)
-    covariance = Scaled.of(normal_matrix(flat, precision)).inverse()
-    slope = flat @ whitened[:, accepted].reshape(-1)
-    slope -= precision * fitted.model.deviation(fitted.linear.state)
-    left = whitened - np.tensordot(covariance @ slope, jacobian, axes=1)
-    return replace(
-        fitted,
-        linear=replace(fitted.linear, whitened=left),
-        accepted=accepted,
-        bad=(),
-        step_covariance=covariance,
-    )
-
-
-def _in_um(run: Run, sigma: float, scatter: float) -> Remark:
-    return Remark(
-        "sigma-in-um",
-        f"sx, sy, sz look like um: {sigma:.3g} means {sigma:.3g} mm",
-        (),
-        f"The readings scatter {scatter:.2g} times as much as that says",
-        "Read as um",
-        "Write sx, sy, sz in mm",
-        True,
-        run.source,
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class _Scan:
-    """Fall of chi-square (M,) if columns act from each accepted reading on, and their sizes."""
-
-    fall: Array
-    sizes: Array
-
-
-def _scan(fitted: Fit, columns: Array, *, early: bool = False) -> _Scan:
-    """Let columns (k, 3, A) act from reading m on (early: up to it), for every m of A accepted."""
-    jacobian = fitted.linear.jacobian[:, :, fitted.accepted]
-    residual = fitted.linear.whitened[:, fitted.accepted]
-    weights = np.einsum("kin,lin->nkl", columns, columns)
-    scores = np.einsum("kin,in->nk", columns, residual)
-    mixed = np.einsum("pin,kin->npk", jacobian, columns)
-    weights, scores, mixed = (_summed(one, early=early) for one in (weights, scores, mixed))
-    taken = np.einsum("npk,pq,nql->nkl", mixed, fitted.step_covariance, mixed, optimize=True)
-    weights = weights - taken
-    size = np.sqrt(np.maximum(np.einsum("nkk->nk", weights), 1e-300))
-    scaled = weights / size[:, :, None] / size[:, None, :] + 1e-6 * np.eye(columns.shape[0])
-    beta = np.linalg.solve(scaled, (scores / size)[:, :, None])[:, :, 0]
-    return _Scan(np.sum(beta * scores / size, axis=1), beta / size)
-
-
-def _summed(values: Array, *, early: bool) -> Array:
-    if early:
-        return np.asarray(np.cumsum(values, axis=0))
-    return np.asarray(np.cumsum(values[::-1], axis=0)[::-1])
-
-
-def _whitened(fitted: Fit, motions: Array) -> Array:
-    """Motions (k, 3, N) in the base frame as whitened columns (k, 3, A)."""
-    situation, rows = fitted.linear.situation, fitted.model.rows
-    turned = np.stack([rotate(situation.frame_rotation, one) for one in motions])
-    whitened = np.einsum("ijn,kjn->kin", rows.whitener, turned)
-    return np.asarray(whitened[:, :, fitted.accepted])
-
-
 @dataclass(frozen=True, eq=False)
 class _Step:
     """A frame that steps: the row, the values of ``frame-shift``, and what it explains."""
@@ -179,22 +106,22 @@ def _step(fitted: Fit) -> _Step | None:
     situation, rows = fitted.linear.situation, fitted.model.rows
     kept = np.flatnonzero(fitted.accepted)
     inner = slice(LEAST, kept.size - LEAST + 1)
-    base = _scan(fitted, _whitened(fitted, rigid_motions(situation.base_point)))
+    base = scan(fitted, whitened(fitted, rigid_motions(situation.base_point)))
     fall = base.fall[inner]
     if fall.size == 0:
         return None
     at = int(np.argmax(fall)) + LEAST
     best = float(base.fall[at])
-    if best < max(FALL, SHARE * (fitted.chi2 - fitted.dof)):
+    if best < max(FALL, SHARE * excess(fitted)):
         return None
     others = [situation.actuator_columns[[k]] for k in range(len(rows.machine.actuators))]
     tool = rigid_motions(rows.nest) * rows.on_platform
     turned = np.stack([rotate(situation.rotation, one) for one in tool])
     others.append(np.einsum("ijn,kjn->kin", situation.whitened_frame, turned))
-    rivals = [_scan(fitted, one[:, :, fitted.accepted]).fall[inner].max() for one in others]
+    rivals = [scan(fitted, one[:, :, fitted.accepted]).fall[inner].max() for one in others]
     drift = rigid_motions(situation.point) * rows.progress
     slow = np.einsum("ijn,kjn->kin", rows.whitener, drift)[:, :, fitted.accepted]
-    rivals.append(_scan(fitted, slow).fall[0])
+    rivals.append(scan(fitted, slow).fall[0])
     if best < max(rivals) + CLEAR:
         return None
     row = int(kept[at])
@@ -214,7 +141,7 @@ def _step_remark(fitted: Fit, found: _Step) -> Remark:
         f"{rows.line[found.row]} ({rows.time_s[found.row]:.0f} s)",
         ranges(rows.line[found.row :], rows.line),
         f"One step of the frame explains "
-        f"{100 * found.fall / max(fitted.chi2 - fitted.dof, found.fall):.0f} % of the misfit",
+        f"{100 * found.fall / max(excess(fitted), found.fall):.0f} % of the misfit",
         "The step is in the model as frame-shift; nothing is excluded for it",
         "Nothing, or begin a new run after the move; fasten what was moved",
         True,
@@ -252,22 +179,22 @@ def _seat(fitted: Fit) -> _Seat | None:
         for room, early in product((False, True), (False, True)):
             normal = np.array([0.0, 0.0, 1.0]) if room else normal_of(header)
             tried = at[LEAST:] if early else at[: at.size - LEAST]
-            scan = _scan(fitted, _seat_columns(fitted, own, room=room), early=early)
-            edge = int(tried[np.argmax(scan.fall[tried])])
+            tries = scan(fitted, _seat_columns(fitted, own, room=room), early=early)
+            edge = int(tried[np.argmax(tries.fall[tried])])
             whole = int(at[-1] if early else at[0])
-            if scan.fall[whole] > scan.fall[edge] - CLEAR:
+            if tries.fall[whole] > tries.fall[edge] - CLEAR:
                 edge = whole
             which = named & ((np.arange(own.size) <= kept[edge]) == early)
             which[kept[edge]] = True
             if edge == whole:
                 which = named
-            size = float(np.linalg.norm(scan.sizes[edge]))
-            if size < SMALLEST_SEAT or abs(normal @ scan.sizes[edge]) < ALONG * size:
+            size = float(np.linalg.norm(tries.sizes[edge]))
+            if size < SMALLEST_SEAT or abs(normal @ tries.sizes[edge]) < ALONG * size:
                 continue
-            found = _Seat(name, room, which, scan.sizes[edge], float(scan.fall[edge]))
+            found = _Seat(name, room, which, tries.sizes[edge], float(tries.fall[edge]))
             if best is None or found.fall > best.fall:
                 best = found
-    if best is None or best.fall < max(FALL, SEAT_SHARE * (fitted.chi2 - fitted.dof)):
+    if best is None or best.fall < max(FALL, SEAT_SHARE * excess(fitted)):
         return None
     return best
 
@@ -297,6 +224,6 @@ def _seated(
     again = _fit(machine, moved, {})
     if again is not None:
         here = np.isin(again.model.rows.line, lines)
-        more = _scan(again, _seat_columns(again, here, room=seat.room)).sizes[0]
+        more = scan(again, _seat_columns(again, here, room=seat.room)).sizes[0]
         moved, remark = taken(seat.offset + more)
     return [moved], [remark], {}

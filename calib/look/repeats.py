@@ -4,18 +4,21 @@ A tracker that is measuring never reads the same point twice to its last digit w
 elsewhere; a file that holds a row twice holds one reading.
 """
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
+from scipy import special
 
-from calib.arrays import Array, BoolArray, IntArray
+from calib.arrays import BoolArray, IntArray
+from calib.look.digits import decimals_of
 from calib.runs.record import Run
 from calib.runs.remark import Remark, lines_in_words, ranges
 
-DECIMALS = 9
-"""Digits behind the point, mm, that are looked for."""
 BY_CHANCE = 1e-4
 """Probability that rows agree to the last digit, from which on that is no chance."""
+A_STEP = 1e-3
+"""Part of the travel used in a run by which the SMR stands clearly elsewhere."""
 ONE_AXIS = 5
 """Successive readings that must agree along one axis alone."""
 
@@ -23,7 +26,7 @@ ONE_AXIS = 5
 def no_measurements(run: Run) -> tuple[Run, list[Remark]]:
     """Set aside readings of exactly zero, rows that stand twice, and readings that are stale."""
     remarks = []
-    for look in (_zeros, _twice, _stale, _stale_axes):
+    for look in (_zeros, _twice, _stale, _same, _stale_axes):
         which, remark = look(run)
         if remark is not None:
             run = replace(run, measured=run.measured & ~which)
@@ -49,20 +52,21 @@ def _zeros(run: Run) -> tuple[BoolArray, Remark | None]:
 
 
 def _twice(run: Run) -> tuple[BoolArray, Remark | None]:
-    """Rows that repeat the row before in every digit at the same place."""
-    before, same = _pairs(run)
+    """Rows that repeat an earlier row in every digit at the same place."""
     which = np.zeros(run.line.size, dtype=bool)
-    for row, last in enumerate(before):
-        if last >= 0 and same[row] and _one_stop(run, row, int(last)):
-            which[row] = np.array_equal(run.position[:, row], run.position[:, last])
-    if not which.any() or _agreement(run, int(which.sum())) > BY_CHANCE:
-        return which, None
+    first: dict[bytes, int] = {}
+    for row in np.flatnonzero(run.measured):
+        last = first.setdefault(run.position[:, row].tobytes(), int(row))
+        which[row] = last != row and _one_stop(run, int(row), last)
+    found = int(which.sum())
+    if not found or special.gammainc(found, _one_stop_pairs(run) * _agreement(run)) > BY_CHANCE:
+        return np.zeros_like(which), None
     lines = ranges(run.line[which], run.line[run.measured])
     return which, Remark(
         "rows-twice",
-        f"{_count(which)} the row before once more",
+        f"{_count(which)} an earlier row once more",
         lines,
-        "Nest, actuators and all digits of x, y, z are those of the row before",
+        "Nest, actuators and all digits of x, y, z are those of an earlier row",
         f"Counted once ({lines_in_words(lines)} set aside)",
         "Write every reading once",
         True,
@@ -77,10 +81,9 @@ def _stale(run: Run) -> tuple[BoolArray, Remark | None]:
     for row, last in enumerate(before):
         if last < 0 or not np.array_equal(run.position[:, row], run.position[:, last]):
             continue
-        which[row] = which[last] or not _one_stop(run, row, int(last))
-    which &= _in_a_row(which, before)
-    if not which.any() or _agreement(run, 1) > BY_CHANCE:
-        return which, None
+        which[row] = which[last] or _elsewhere(run, row, int(last))
+    if not which.any() or _agreement(run) > BY_CHANCE:
+        return np.zeros_like(which), None
     lines = ranges(run.line[which], run.line[run.measured])
     return which, Remark(
         "stale-readings",
@@ -96,13 +99,30 @@ def _stale(run: Run) -> tuple[BoolArray, Remark | None]:
     )
 
 
-def _in_a_row(which: BoolArray, before: IntArray) -> BoolArray:
-    """Those among rows that follow one another: a single repeat is a matter of its own place."""
-    many = np.zeros_like(which)
-    for row in np.flatnonzero(which):
-        if before[row] >= 0 and which[before[row]]:
-            many[[row, before[row]]] = True
-    return many
+def _same(run: Run) -> tuple[BoolArray, Remark | None]:
+    """Readings that are one point to the last digit, at different places and not in a row."""
+    which = np.zeros(run.line.size, dtype=bool)
+    groups: dict[bytes, list[int]] = {}
+    for row in np.flatnonzero(run.measured):
+        groups.setdefault(run.position[:, row].tobytes(), []).append(int(row))
+    for rows in groups.values():
+        if any(_elsewhere(run, row, rows[0]) for row in rows):
+            which[rows] = True
+    if not which.any() or _agreement(run) > BY_CHANCE:
+        return np.zeros_like(which), None
+    lines = ranges(run.line[which], run.line[run.measured])
+    point = ", ".join(f"{value:g}" for value in run.position[:, which][:, 0])
+    return which, Remark(
+        "same-readings",
+        f"{_count(which)} the same point to the last digit ({point}) at different places of the "
+        "SMR: no measurement",
+        lines,
+        "The SMR was elsewhere, and x, y, z are the same",
+        f"Set aside ({lines_in_words(lines)})",
+        "Leave x..sz empty where nothing was read, or measure these poses again",
+        True,
+        run.source,
+    )
 
 
 def _stale_axes(run: Run) -> tuple[BoolArray, Remark | None]:
@@ -157,21 +177,29 @@ def _one_stop(run: Run, row: int, last: int) -> bool:
     return run.nest[row] == run.nest[last] and np.array_equal(run.q[:, row], run.q[:, last])
 
 
-def _agreement(run: Run, pairs: int) -> float:
-    """Probability that two readings of one point agree to the last digit, for so many pairs."""
+def _elsewhere(run: Run, row: int, last: int) -> bool:
+    """Whether the SMR stood clearly elsewhere at two readings: steps of some um may not show."""
+    if run.nest[row] != run.nest[last]:
+        return True
+    span = np.ptp(run.q[:, run.measured], axis=1)
+    return bool(np.any(np.abs(run.q[:, row] - run.q[:, last]) > A_STEP * span))
+
+
+def _one_stop_pairs(run: Run) -> int:
+    """How many pairs of readings are of one nest at one stop."""
+    stops = Counter(
+        (run.nest[row], run.q[:, row].tobytes()) for row in np.flatnonzero(run.measured)
+    )
+    return sum(count * (count - 1) // 2 for count in stops.values())
+
+
+def _agreement(run: Run) -> float:
+    """Probability that two readings of one point agree to the last digit."""
     position = run.position[:, run.measured]
     variances = np.einsum("iin->in", run.covariance[:, :, run.measured])
     sigma = np.sqrt(np.median(variances, axis=1))
-    step = 10.0 ** -_decimals(position)
-    return float(pairs * np.prod(np.minimum(1.0, step / (2.0 * np.sqrt(np.pi) * sigma))))
-
-
-def _decimals(values: Array) -> int:
-    """Digits behind the point with which the numbers were written."""
-    for digits in range(DECIMALS):
-        if np.allclose(values, np.round(values, digits), rtol=0.0, atol=1e-11):
-            return digits
-    return DECIMALS
+    step = 10.0 ** -decimals_of(position)
+    return float(np.prod(np.minimum(1.0, step / (2.0 * np.sqrt(np.pi) * sigma))))
 
 
 def _count(which: BoolArray) -> str:

@@ -1,0 +1,85 @@
+"""What freeing columns would lower the cost of a fit by, the geometry freed with them.
+
+With the whitened Jacobian J of a fit and its covariance C, columns A have the weight
+V = A A^T - A J^T C J A^T and the scores s = A e; freeing them lowers chi-square and the cost of the
+priors together by s^T V^-1 s. All moments are tried: sums over the readings from one on.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib.arrays import Array
+from calib.identify.fitting import Fit
+from calib.mechanism.rigid import rotate
+from calib.scaled import Scaled, normal_matrix
+
+
+def excess(fitted: Fit) -> float:
+    """Chi-square and the cost of the priors, beyond what a good record leaves.
+
+    A machine within its tolerances costs about as much as it has readings' components.
+    """
+    return fitted.chi2 + prior_cost(fitted) - 3.0 * float(fitted.accepted.sum())
+
+
+def prior_cost(fitted: Fit) -> float:
+    """How far the geometry was bent: the sum of squares in standard deviations of the priors."""
+    return float(fitted.prior_precision @ fitted.model.deviation(fitted.linear.state) ** 2)
+
+
+def with_the_excluded(fitted: Fit) -> Fit:
+    """The fit as it would be of all readings, to first order: a step passes for so many strays."""
+    accepted = fitted.model.usable.copy()
+    precision = fitted.prior_precision
+    jacobian, whitened = fitted.linear.jacobian, fitted.linear.whitened
+    flat = jacobian[:, :, accepted].reshape(precision.size, -1)
+    covariance = Scaled.of(normal_matrix(flat, precision)).inverse()
+    slope = flat @ whitened[:, accepted].reshape(-1)
+    slope -= precision * fitted.model.deviation(fitted.linear.state)
+    left = whitened - np.tensordot(covariance @ slope, jacobian, axes=1)
+    return replace(
+        fitted,
+        linear=replace(fitted.linear, whitened=left),
+        accepted=accepted,
+        bad=(),
+        step_covariance=covariance,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """Fall of chi-square (M,) if columns act from each accepted reading on, and their sizes."""
+
+    fall: Array
+    sizes: Array
+
+
+def scan(fitted: Fit, columns: Array, *, early: bool = False) -> Scan:
+    """Let columns (k, 3, A) act from reading m on (early: up to it), for every m of A accepted."""
+    jacobian = fitted.linear.jacobian[:, :, fitted.accepted]
+    residual = fitted.linear.whitened[:, fitted.accepted]
+    weights = np.einsum("kin,lin->nkl", columns, columns)
+    scores = np.einsum("kin,in->nk", columns, residual)
+    mixed = np.einsum("pin,kin->npk", jacobian, columns)
+    weights, scores, mixed = (_summed(one, early=early) for one in (weights, scores, mixed))
+    taken = np.einsum("npk,pq,nql->nkl", mixed, fitted.step_covariance, mixed, optimize=True)
+    weights = weights - taken
+    size = np.sqrt(np.maximum(np.einsum("nkk->nk", weights), 1e-300))
+    scaled = weights / size[:, :, None] / size[:, None, :] + 1e-6 * np.eye(columns.shape[0])
+    beta = np.linalg.solve(scaled, (scores / size)[:, :, None])[:, :, 0]
+    return Scan(np.sum(beta * scores / size, axis=1), beta / size)
+
+
+def _summed(values: Array, *, early: bool) -> Array:
+    if early:
+        return np.asarray(np.cumsum(values, axis=0))
+    return np.asarray(np.cumsum(values[::-1], axis=0)[::-1])
+
+
+def whitened(fitted: Fit, motions: Array) -> Array:
+    """Motions (k, 3, N) in the base frame as whitened columns (k, 3, A)."""
+    situation, rows = fitted.linear.situation, fitted.model.rows
+    turned = np.stack([rotate(situation.frame_rotation, one) for one in motions])
+    whitened = np.einsum("ijn,kjn->kin", rows.whitener, turned)
+    return np.asarray(whitened[:, :, fitted.accepted])
