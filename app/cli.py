@@ -18,7 +18,7 @@ VERBS = Path(__file__).parent / "verbs"
 # The order in which an operator works; it is the order of ``pkmcal --help``.
 TASKS = (
     ("Know the machine", ("machine", "poses", "design", "sensitivity", "identifiability")),
-    ("Measure", ("site", "measure", "resume")),
+    ("Measure", ("site", "measure", "resume", "import")),
     ("Identify", ("fit", "compare")),
     ("Find what the model misses", ("diagnose", "discover")),
     ("Correct and prove it", ("apply", "undo", "correct", "export", "verify", "iso9283", "report")),
@@ -36,7 +36,7 @@ class Verbs(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Every verb there is, in working order."""
-        there = {path.stem for path in VERBS.glob("*.py") if not path.stem.startswith("_")}
+        there = {path.stem.rstrip("_") for path in VERBS.glob("*.py") if path.stem[0] != "_"}
         ordered = [verb for _, verbs in TASKS for verb in verbs if verb in there]
         return ordered + sorted(there - set(ordered))
 
@@ -44,7 +44,7 @@ class Verbs(click.Group):
         """Import one verb."""
         if cmd_name not in self.list_commands(ctx):
             return None
-        command: click.Command = import_module(f"app.verbs.{cmd_name}").command
+        command: click.Command = import_module(f"app.verbs.{_file(cmd_name).stem}").command
         command.name = cmd_name
         return command
 
@@ -70,9 +70,15 @@ class Verbs(click.Group):
                     formatter.write_dl([(verb, _says(verb)) for verb in here], col_max=16)
 
 
+def _file(verb: str) -> Path:
+    """The file of a verb; one that is a word of Python's has an underscore behind it."""
+    path = VERBS / f"{verb}.py"
+    return path if path.is_file() else VERBS / f"{verb}_.py"
+
+
 def _says(verb: str) -> str:
     """First line of a verb's docstring, read without importing it."""
-    with (VERBS / f"{verb}.py").open(encoding="utf-8") as source:
+    with _file(verb).open(encoding="utf-8") as source:
         return source.readline().strip().strip('"').rstrip(".")
 
 

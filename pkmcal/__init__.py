@@ -48,6 +48,10 @@ if TYPE_CHECKING:
     from app.jobs.fitting import fit as fit
     from app.jobs.following_up import FollowUpReport as FollowUpReport
     from app.jobs.following_up import design as design
+    from app.jobs.guessing import GuessReport as GuessReport
+    from app.jobs.guessing import guess_map as guess_map
+    from app.jobs.importing import ImportReport as ImportReport
+    from app.jobs.importing import import_run as import_run
     from app.jobs.measuring import SessionReport as SessionReport
     from app.jobs.posing import GridReport as GridReport
     from app.jobs.posing import PosesReport as PosesReport
@@ -76,6 +80,8 @@ _HOMES = {
     "FollowUpReport": "app.jobs.following_up",
     "GateRefused": "app.errors",
     "GridReport": "app.jobs.posing",
+    "GuessReport": "app.jobs.guessing",
+    "ImportReport": "app.jobs.importing",
     "PosesReport": "app.jobs.posing",
     "SessionReport": "app.jobs.measuring",
     "SetsReport": "app.jobs.applying",
@@ -91,6 +97,8 @@ _HOMES = {
     "diagnose": "app.jobs.discovering",
     "discover": "app.jobs.discovering",
     "fit": "app.jobs.fitting",
+    "guess_map": "app.jobs.guessing",
+    "import_run": "app.jobs.importing",
     "load_machine": "app.files.machines",
     "load_runs": "app.jobs.chosen_runs",
     "mock_station": "pkmcal.mock",
@@ -113,6 +121,8 @@ __all__ = [
     "FollowUpReport",
     "GateRefused",
     "GridReport",
+    "GuessReport",
+    "ImportReport",
     "NameTaken",
     "PosesReport",
     "SessionReport",
@@ -129,6 +139,8 @@ __all__ = [
     "diagnose",
     "discover",
     "fit",
+    "guess_map",
+    "import_run",
     "load_machine",
     "load_runs",
     "mock_station",

@@ -1,9 +1,12 @@
 """Reading and writing runs on disk."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import tomli_w
 
 from app.files.machines import load_machine
 from app.files.text import read_text
@@ -99,13 +102,23 @@ def outside_runs(path: Path | None, folders: tuple[str, ...]) -> None:
             )
 
 
-def write_run(folder: Path, run: Run, digits: Digits = EXACT, *, replace: bool = False) -> None:
+def write_run(
+    folder: Path,
+    run: Run,
+    digits: Digits = EXACT,
+    *,
+    replace: bool = False,
+    beside: Mapping[str, Any] | None = None,
+) -> None:
     """Write a run's two files, each of them whole or not at all.
 
-    A folder that holds a run already is refused (BadInput), or its run is replaced.
+    A folder that holds a run already is refused (BadInput), or its run is replaced. ``beside`` are
+    more tables of run.toml, which no reader asks for.
     """
     folder.mkdir(parents=True, exist_ok=True)
     texts = dict(zip((HEADER, POINTS), format_run(run, digits), strict=True))
+    if beside:
+        texts[HEADER] += "\n" + tomli_w.dumps(beside)
     for name in texts:
         if not replace and (folder / name).exists():
             raise BadInput(

@@ -8,9 +8,9 @@ To add a verb, write a module that
   function);
 - stays a face: arguments in, one call into the layers below, the answer printed. About 150 lines.
 
-It is found by its file name and imported only when it is called, so heavy imports (numpy, drivers)
-at its top are fine. Its place in ``pkmcal --help`` comes from ``TASKS`` in :mod:`app.cli`; a verb
-that is missing there is listed last.
+It is found by its file name (``import_.py`` is ``import``) and imported only when it is called, so
+heavy imports (numpy, drivers) at its top are fine. Its place in ``pkmcal --help`` comes from
+``TASKS`` in :mod:`app.cli`; a verb that is missing there is listed last.
 
 Errors are raised, never printed: :class:`calib.errors.BadInput` ends the program with exit code 2,
 :class:`drivers.errors.DeviceError` with 3, :class:`app.errors.StoppedByOperator` with 4,

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from calib.arrays import Array
 from calib.look.clock import clock
+from calib.look.conventions import check_conventions, check_lengths
 from calib.look.digits import rounding
 from calib.look.labels import any_labels, mirrored_table, other_labels
 from calib.look.load import load_and_payload
@@ -52,6 +53,7 @@ def first_look(machine: Machine, runs: Sequence[Run]) -> Rows:
     for run in runs:
         check_travel(machine, run)
         run, of_rows = rows_alone(machine, run)
+        check_lengths(machine, run)
         parts, of_places, shown = _places(machine, run)
         if shown and len(runs) > 1:
             parts = _parted(machine, run)
@@ -91,12 +93,15 @@ def _places(machine: Machine, run: Run) -> tuple[list[Run], list[Remark], _Known
     for _ in range(MOST_ROUNDS):
         places = places_of(machine, run)
         if places is None:
+            check_conventions(machine, run, None)
             break
         _, inside = places.majority
         count = int(inside.sum())
         if inside.size - count < places.limit:
             break
         best = _best(places, count)
+        if not remarks:
+            check_conventions(machine, run, places, 0 if best is None else best.explained)
         if best is None:
             break
         run, remark = best.take()

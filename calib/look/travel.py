@@ -3,7 +3,7 @@
 import numpy as np
 
 from calib.arrays import Array
-from calib.errors import BadInput
+from calib.look.conventions import Misread
 from calib.mechanism.description import Machine
 from calib.runs.record import Run
 
@@ -18,7 +18,7 @@ _ANGLES = ((np.pi / 180.0, "degrees"), (0.001, "mrad"), (2.0 * np.pi, "turns"))
 
 
 def check_travel(machine: Machine, run: Run) -> None:
-    """Refuse coordinates that are nowhere near the travel; raises BadInput naming what they are."""
+    """Refuse coordinates that are nowhere near the travel; raises Misread naming what they are."""
     inside = _inside(machine, run.q)
     if inside.mean() >= 1.0 - OUTSIDE:
         return
@@ -27,13 +27,14 @@ def check_travel(machine: Machine, run: Run) -> None:
         return
     row = int(np.argmin(inside))
     first = machine.actuators[0]
-    raise BadInput(
+    raise Misread(
         f"q1..q{len(machine.actuators)} are outside the travel of the actuators "
         f"({first.name}: {first.limits[0]:.4g} to {first.limits[1]:.4g} {first.unit}, here "
         f"{run.q[0, row]:.6g}); they look like {explained}",
         place=f"{run.source}, line {run.line[row]}",
         remedy=f"Write what the machine file calls q: {first.unit}, counted so that home is "
         f"{first.home:.6g}",
+        of="q",
     )
 
 

@@ -73,6 +73,11 @@ def parse_header(
 def header_of(top: TomlTable, parameters: Collection[str] | None = None) -> Header:
     """Read the tables of ``run.toml``, see :func:`parse_header`; other keys are left alone."""
     top.format(FORMAT)
+    return contents_of(top, parameters)
+
+
+def contents_of(top: TomlTable, parameters: Collection[str] | None = None) -> Header:
+    """Read the same tables in a file of another format; raises BadInput with line and key."""
     machine = top.text("machine")
     if not machine.strip():
         raise top.wrong(

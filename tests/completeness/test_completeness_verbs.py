@@ -20,6 +20,7 @@ ROOT = Path(__file__).parents[2]
 RUNS = ROOT / "tests" / "data" / "runs"
 PAGE = (ROOT / "docs" / "verbs-and-answers.md").read_text(encoding="utf-8")
 RUN = str(RUNS / "no-effect")
+MAPS = ROOT / "tests" / "data" / "maps"
 WRITER = runpy.run_path(str(ROOT / "docs" / "make_schemas.py"))
 
 # How each verb is asked here. On a station: in the tests of the whole job, by the same schemas.
@@ -34,6 +35,10 @@ ASKED: dict[str, tuple[str, ...] | None] = {
     "identifiability": ("identifiability", "tripod"),
     "measure": None,
     "resume": None,
+    "import": (
+        *("import", f"{RUN}/points.csv", "--map", f"{MAPS}/own-points.toml"),
+        *("--header", f"{RUN}/run.toml", "--out", "{}/imported"),
+    ),
     "fit": ("fit", RUN, "--add", "backlash"),
     "compare": ("compare", RUN),
     "diagnose": ("diagnose", RUN),

@@ -23,6 +23,9 @@ SIGNATURES = {
     "diagnose": "runs, *, add=(), model=None, offer=(), watch=None",
     "discover": "runs, *, add=(), model=None, offer=(), watch=None",
     "fit": "runs, *, add=(), model=None",
+    "guess_map": "files, out, *, machine=None",
+    "import_run": "files, map, run, *, machine=None, header=None, commands=None, "
+    "as_it_stands=False",
     "load_machine": "name_or_path, relative_to=None",
     "load_runs": "runs",
     "mock_station": "machine='hexapod', *, seed=1, scale=600.0, effects=None, folder=None",
@@ -62,6 +65,8 @@ FIELDS = {
     "FollowUpReport": "machine discriminate model runs conditions right_now right_then poses "
     "advice",
     "GridReport": "machine workspace_scale box poses",
+    "GuessReport": "map columns rows preview assumed missing",
+    "ImportReport": "runs machine map rows readings poses assumed record",
     "PosesReport": "machine criterion readings tolerances_as_priors candidates seed predicted "
     "random_poses by_count path_in_strokes poses",
     "SessionReport": "session run readings",

@@ -1,0 +1,317 @@
+"""Maps: how the tables of an instrument or a program become a run (``pkm-import/1``).
+
+A map is a ``run.toml`` with another ``format``, in which the tables of this file say where each
+column of ``points.csv`` comes from. Described in docs/import.md.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from app.files.foreign_table import Column, Layout, layout_of
+from app.files.import_columns import Numbers, Text, columns_of, numbers_of, text_of
+from calib.runs.header import Header, contents_of
+from calib.toml_table import TomlTable
+from calib.units import Unit, unit_named
+
+FORMAT = "pkm-import/1"
+FORMS = ("s", "iso", "clock")
+"""What times may be, besides a pattern of strptime."""
+TABLES = (
+    "format", "machine", "title", "tracker", "nests", "controller", "load", "file", "time", "pose",
+    "nest", "station", "only", "actuators", "commanded_pose", "reading", "sigma", "channels",
+    "commands",
+)  # fmt: skip
+"""What a map may hold: what a run.toml has, and where the columns come from."""
+KINDS = ("xyz", "spherical")
+VERTICAL = ("elevation", "zenith")
+HORIZONTAL = ("counter-clockwise", "clockwise")
+ROTATIONS = ("quaternion wxyz", "quaternion xyzw", "rotation vector")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Where one reading of a row stands; ``nest`` "" where a column names it."""
+
+    kind: str
+    numbers: Numbers
+    nest: str = ""
+    distance_mm: float | None = None
+    vertical: str = "elevation"
+    horizontal: str = "counter-clockwise"
+    far: bool = False
+    """Directions of what is so far away that they are the same from everywhere: stars."""
+
+
+@dataclass(frozen=True)
+class Sigma:
+    """Uncertainty of a reading, 1 sigma: columns, or what the map states (mm, rad, mm/mm)."""
+
+    numbers: Numbers | None
+    coverage: float = 1.0
+    value: float | None = None
+    per_distance: float = 0.0
+    angle: float | None = None
+    distance: float | None = None
+    place: str = ""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A channel: a column, or one value for the whole run."""
+
+    numbers: Numbers | None
+    value: float = 0.0
+
+
+@dataclass(frozen=True)
+class Time:
+    """Where the time of a row stands; without columns rows are ``step_s`` apart."""
+
+    columns: tuple[Column, ...]
+    form: str = "s"
+    unit: Unit | None = None
+    step_s: float = 0.0
+    place: str = ""
+    sort: bool = False
+
+
+@dataclass(frozen=True)
+class Commanded:
+    """Commanded poses instead of actuator coordinates."""
+
+    place_numbers: Numbers
+    turn_numbers: Numbers
+    rotation: str
+    place: str
+
+
+@dataclass(frozen=True)
+class Commands:
+    """A second table: what was commanded, by the label of the pose."""
+
+    layout: Layout
+    pose: Text
+
+
+@dataclass(frozen=True)
+class ImportMap:
+    """A map as read; ``machine`` "" and ``header`` None where it names no machine and no nests."""
+
+    source: str
+    layout: Layout
+    machine: str
+    header: Header | None
+    time: Time
+    pose: Text
+    nest: Text | None
+    station: Text | None
+    only: Text | None
+    actuators: Numbers | None
+    commanded: Commanded | None
+    readings: tuple[Reading, ...]
+    sigma: Sigma
+    channels: Mapping[str, Channel]
+    commands: Commands | None
+
+
+def parse_map(text: str, source: str) -> ImportMap:
+    """Read a map.
+
+    Raises
+    ------
+    BadInput
+        With file, line and key.
+    """
+    return map_of(TomlTable.parse(text, source), source)
+
+
+def map_of(top: TomlTable, source: str) -> ImportMap:
+    """Read the tables of a map, see :func:`parse_map`."""
+    top.format(FORMAT)
+    top.only(*TABLES)
+    machine = top.text("machine", "")
+    header = contents_of(top, None) if top.has("nests") else None
+    layout = layout_of(top.table("file", required=False))
+    actuators, commanded = _commanded(top)
+    readings = tuple(_readings(top))
+    sigma = _sigma(top.table("sigma"), spherical=any(r.kind == "spherical" for r in readings))
+    nest = text_of(top, "nest")
+    if nest is None and not all(reading.nest for reading in readings):
+        raise top.wrong(
+            "nothing says in which nest a reading was", "nest",
+            remedy='Add [nest] with column = "...", or nest = "..." to every [[reading]]',
+        )  # fmt: skip
+    pose = text_of(top, "pose")
+    if pose is None:
+        raise top.wrong(
+            "nothing says which poses belong together", "pose",
+            remedy='Add [pose] with column = "...", same_joints = true or each_row = true',
+        )  # fmt: skip
+    commands = None
+    if top.has("commands"):
+        table = top.table("commands")
+        key = text_of(table, "pose")
+        if key is None:
+            raise table.wrong("no column has the label of the pose", "pose", remedy="Add pose")
+        commands = Commands(layout_of(table.table("file", required=False)), key)
+        table.end()
+    return ImportMap(
+        source,
+        layout,
+        machine,
+        header,
+        _time(top.table("time")),
+        pose,
+        nest,
+        text_of(top, "station"),
+        text_of(top, "only"),
+        actuators,
+        commanded,
+        readings,
+        sigma,
+        {name: _channel(one) for name, one in _tables(top.named("channels", required=False))},
+        commands,
+    )
+
+
+def _tables(named: TomlTable) -> list[tuple[str, TomlTable]]:
+    return [(name, named.table(name)) for name in named]
+
+
+def _commanded(top: TomlTable) -> tuple[Numbers | None, Commanded | None]:
+    """Actuator coordinates, or commanded poses."""
+    if top.has("actuators") == top.has("commanded_pose"):
+        raise top.wrong(
+            "the map names both actuators and commanded poses"
+            if top.has("actuators")
+            else "nothing says what was commanded",
+            "actuators",
+            remedy="Write one of [actuators] and [commanded_pose]",
+        )
+    if top.has("actuators"):
+        table = top.table("actuators")
+        actuators = numbers_of(table, None, ("",))
+        table.end()
+        return actuators, None
+    table = top.table("commanded_pose")
+    rotation = table.text("rotation")
+    angles = re.fullmatch(r"[xyz]{3}|[XYZ]{3}", rotation) and rotation[1] not in rotation[::2]
+    if rotation not in ROTATIONS and not angles:
+        raise table.wrong(
+            f"rotation is {rotation!r}", "rotation",
+            remedy='Write the order of the angles: "XYZ" about the axes that turned before, "xyz" '
+            f"about fixed ones; or {', '.join(ROTATIONS)}",
+        )  # fmt: skip
+    quaternion = rotation.startswith("quaternion")
+    place, turn = table.table("place"), table.table("turn")
+    found = Commanded(
+        numbers_of(place, 3, ("mm",)),
+        numbers_of(turn, 4 if quaternion else 3, ("1",) if quaternion else ("rad",)),
+        rotation,
+        table.place(),
+    )
+    for one in (table, place, turn):
+        one.end()
+    return None, found
+
+
+def _readings(top: TomlTable) -> list[Reading]:
+    found = []
+    for table in top.tables("reading"):
+        kind = table.choice("kind", KINDS, "xyz")
+        nest = table.text("nest", "")
+        if kind == "xyz":
+            found.append(Reading(kind, numbers_of(table, 3, ("mm",)), nest))
+        else:
+            found.append(_spherical(table, nest))
+        table.end()
+        if found[-1].kind != found[0].kind:
+            raise table.wrong(
+                "readings of two kinds", "kind", remedy="Import them by a map each, to a run each"
+            )
+    if not found:
+        raise top.wrong(
+            "nothing says where a reading stands", "reading",
+            remedy='Add [[reading]] with columns = ["X", "Y", "Z"] and unit = "mm"',
+        )  # fmt: skip
+    return found
+
+
+def _spherical(table: TomlTable, nest: str) -> Reading:
+    distance = None
+    if table.has("distance"):
+        distance = table.quantity("distance", "mm", 0.0)
+        if not distance > 0.0:
+            raise table.wrong("a distance of zero has no direction", "distance")
+    count = 3 if distance is None else 2
+    return Reading(
+        "spherical",
+        numbers_of(table, count, ("rad", "rad", "mm")[:count]),
+        nest,
+        distance,
+        table.choice("vertical", VERTICAL),
+        table.choice("horizontal", HORIZONTAL),
+        table.flag("far", False),
+    )
+
+
+def _sigma(table: TomlTable, *, spherical: bool) -> Sigma:
+    """What a reading's uncertainty is; raises BadInput where nothing states it."""
+    coverage = table.number("coverage", 1.0, above=0.0)
+    place = table.place()
+    if spherical:
+        angle = table.quantity("angle", "rad", 0.0, least=0.0)
+        distance = table.quantity("distance", "mm", 0.0, least=0.0)
+        if angle <= 0.0 or distance <= 0.0:
+            raise table.wrong(
+                "angle and distance need an uncertainty each", "angle",
+                remedy='Write angle = "0.0003 deg" and distance = "0.01 mm"',
+            )  # fmt: skip
+        per = 1e-6 * table.number("ppm", 0.0, least=0.0)
+        table.end()
+        return Sigma(None, coverage, None, per, angle, distance, place)
+    if table.has("columns"):
+        numbers = numbers_of(table, 3, ("mm",))
+        table.end()
+        return Sigma(numbers, coverage, place=place)
+    value = table.quantity("value", "mm", 0.0, least=0.0)
+    if value <= 0.0:
+        raise table.wrong(
+            "nothing says how uncertain a reading is", "value",
+            remedy='Write columns = ["sx", "sy", "sz"] with a unit, or value = "15 um"',
+        )  # fmt: skip
+    per = 1e-6 * table.number("ppm", 0.0, least=0.0)
+    table.end()
+    return Sigma(None, coverage, value, per, place=place)
+
+
+def _channel(table: TomlTable) -> Channel:
+    value = table.number("value") if table.has("value") else 0.0
+    found = Channel(None if table.has("value") else numbers_of(table, 1, ("",), "column"), value)
+    table.end()
+    return found
+
+
+def _time(table: TomlTable) -> Time:
+    columns = columns_of(table, "column")
+    sort = table.flag("sort", False)
+    form = table.text("form", "s")
+    if not columns:
+        step = table.number("step_s", 0.0, unit="s", least=0.0)
+        if step <= 0.0:
+            raise table.wrong(
+                "nothing says when a row was read", "column",
+                remedy='Write column = "..." and form = "iso", "clock" or "s"; or step_s = 10.0',
+            )  # fmt: skip
+        table.end()
+        return Time((), "s", None, step, table.place())
+    if form not in FORMS and "%" not in form:
+        raise table.wrong(
+            f"form is {form!r}", "form",
+            remedy='Write "s", "iso", "clock" (12:34:56), or a pattern: "%d.%m.%Y %H:%M"',
+        )  # fmt: skip
+    unit = table.text("unit", "")
+    found = unit_named(unit, table.place("unit"), "s") if unit else None
+    table.end()
+    return Time(columns, form, found, 0.0, table.place(), sort)

@@ -1,0 +1,290 @@
+"""Foreign tables as the rows of runs, by a map; everything that was assumed is listed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from itertools import pairwise
+
+import numpy as np
+
+from app.files.foreign_table import ForeignTable
+from app.files.import_commands import Row, coordinates, told_by_pose, with_commands
+from app.files.import_map import ImportMap
+from app.files.import_values import Reader, positions, seconds_from_start, times
+from calib.arrays import Array
+from calib.errors import BadInput
+from calib.mechanism.description import Machine
+from calib.runs.header import Header
+from calib.runs.record import Run
+
+CENTRE = "centre"
+"""Reference nest in the machine's origin, for directions of what is far away."""
+FAR_MM = 1000.0
+_PIN_MM = 1e-6
+
+
+@dataclass
+class Imported:
+    """What came of the tables.
+
+    ``runs`` by station ("" where there are none), each row with its line in the file; ``assumed``
+    what neither map nor file states, or what was left out.
+    """
+
+    runs: dict[str, Run]
+    assumed: list[str] = field(default_factory=list)
+    lines_of_file: bool = True
+
+
+def imported(
+    tables: Sequence[ForeignTable],
+    commands: ForeignTable | None,
+    plan: ImportMap,
+    machine: Machine,
+    header: Header,
+) -> Imported:
+    """Turn tables into runs.
+
+    Parameters
+    ----------
+    tables : sequence of ForeignTable
+        Of one layout, in the order in which they were measured.
+    commands : ForeignTable, optional
+        What was commanded, where the map says that it stands in a file of its own.
+
+    Raises
+    ------
+    BadInput
+        With file, line and column.
+    """
+    notes: list[str] = []
+    if any(reading.far for reading in plan.readings):
+        header = replace(header, base_nests={**header.base_nests, CENTRE: np.zeros(3)})
+        notes.append(
+            f"directions are the same from everywhere: the station stands in the machine's origin "
+            f'(nest "{CENTRE}")'
+        )
+    told = None if commands is None else told_by_pose(commands, plan, machine, header, notes)
+    rows: list[Row] = []
+    for table in tables:
+        rows += _Rows(table, plan, machine, header, told, notes).rows()
+    if plan.pose.same_joints:
+        rows = _labelled_by_joints(rows, header)
+    rows = with_commands(rows, header, notes)
+    rows = _in_order(rows, plan, notes)
+    stations = list(dict.fromkeys(row.station for row in rows))
+    if plan.time.step_s:
+        notes.append(f"the file holds no times: rows are {plan.time.step_s:g} s apart")
+    runs = {
+        station: _run([row for row in rows if row.station == station], header, tables, plan)
+        for station in stations
+    }
+    return Imported(runs, list(dict.fromkeys(notes)), len(tables) == 1)
+
+
+class _Rows:
+    """The rows of one table."""
+
+    def __init__(
+        self,
+        table: ForeignTable,
+        plan: ImportMap,
+        machine: Machine,
+        header: Header,
+        told: dict[str, Array] | None,
+        notes: list[str],
+    ) -> None:
+        self.table, self.plan, self.machine, self.header = table, plan, machine, header
+        self.told, self.notes = told, notes
+        self.reader = Reader(table, notes)
+        self.nests = {*header.platform_nests, *header.base_nests}
+
+    def rows(self) -> list[Row]:
+        """Every row that the map chooses, a reading each; moves without a reading too."""
+        plan, table, reader = self.plan, self.table, self.reader
+        count = len(table.rows)
+        chosen = self._chosen()
+        moments = self._moments()
+        stations = reader.labels(plan.station) if plan.station else [""] * count
+        poses = reader.labels(plan.pose) if plan.pose.columns else [""] * count
+        if plan.pose.each_row:
+            poses = [str(line) for line in table.lines]
+        nests = reader.labels(plan.nest) if plan.nest else [""] * count
+        read = [(one.nest, *positions(reader, one, plan.sigma)) for one in plan.readings]
+        q = self._commands(poses)
+        channels = self._channels()
+        self._say_what_is_left()
+        rows: list[Row] = []
+        for row in chosen:
+            move = Row(
+                line=table.lines[row],
+                place=f"{table.source}, line {table.lines[row]}",
+                moment=moments[row],
+                station=stations[row],
+                pose=poses[row],
+                nest="",
+                q=q[:, row],
+                position=None,
+                covariance=None,
+                channels={name: float(values[row]) for name, values in channels.items()},
+            )
+            found = [
+                replace(
+                    move,
+                    pose="" if (nest or nests[row]) in self.header.base_nests else poses[row],
+                    nest=self._nest(row, nest or nests[row]),
+                    position=position[:, row] + (FAR_MM * np.eye(3)[0] if self._far else 0.0),
+                    covariance=covariance[:, :, row],
+                )
+                for nest, position, covariance in read
+                if self._is_there(row, position[:, row])
+            ]
+            rows += found or [move]
+        return [*self._pin(rows), *rows]
+
+    @property
+    def _far(self) -> bool:
+        return any(reading.far for reading in self.plan.readings)
+
+    def _pin(self, rows: list[Row]) -> list[Row]:
+        """The station in the machine's origin, where that is what directions mean."""
+        if not self._far or not rows:
+            return []
+        pinned = replace(
+            rows[0], pose="", nest=CENTRE, position=FAR_MM * np.eye(3)[0],
+            covariance=_PIN_MM**2 * np.eye(3),
+        )  # fmt: skip
+        return [pinned]
+
+    def _chosen(self) -> list[int]:
+        count = len(self.table.rows)
+        if self.plan.only is None:
+            return list(range(count))
+        labels = self.reader.labels(self.plan.only)
+        chosen = [row for row in range(count) if labels[row]]
+        if not chosen:
+            raise BadInput(
+                "[only] chooses no row", place=self.plan.only.place, remedy="Correct its pattern"
+            )
+        if len(chosen) < count:
+            self.notes.append(f"[only] leaves out {count - len(chosen)} of {count} rows")
+        return chosen
+
+    def _moments(self) -> list[float | datetime]:
+        if not self.plan.time.columns:
+            step = self.plan.time.step_s
+            return [step * row for row in range(len(self.table.rows))]
+        found, said = times(self.reader, self.plan.time)
+        if said:
+            self.notes.append(said)
+        return found
+
+    def _commands(self, poses: list[str]) -> Array:
+        if self.told is None:
+            return coordinates(self.reader, self.plan, self.machine, self.header)
+        none = np.full(len(self.machine.actuators), np.nan)
+        return np.array([self.told.get(label, none) for label in poses]).T
+
+    def _channels(self) -> dict[str, Array]:
+        count = len(self.table.rows)
+        return {
+            name: np.full(count, one.value)
+            if one.numbers is None
+            else self.reader.numbers(one.numbers)[0]
+            for name, one in self.plan.channels.items()
+        }
+
+    def _is_there(self, row: int, position: Array) -> bool:
+        there = np.isfinite(position)
+        if there.any() and not there.all():
+            raise BadInput(
+                f"a reading lacks {' and '.join(np.array(['x', 'y', 'z'])[~there])}",
+                place=f"{self.table.source}, line {self.table.lines[row]}",
+                remedy="Expected a whole position, or none",
+            )
+        return bool(there.all())
+
+    def _nest(self, row: int, nest: str) -> str:
+        if nest in self.nests:
+            return nest
+        what = f'unknown nest "{nest}"' if nest else "no nest is found in the label of this reading"
+        known = ", ".join(sorted(self.nests))
+        raise BadInput(
+            what,
+            place=f"{self.table.source}, line {self.table.lines[row]}",
+            remedy=f"Known are {known}. Add its place under [nests.platform] or [nests.base], its "
+            "other name under [nest.names], or choose rows with [only]",
+        )
+
+    def _say_what_is_left(self) -> None:
+        left = [
+            self.table.column_name(at)
+            for at in range(self.table.width)
+            if at not in self.reader.used
+        ]
+        if left:
+            self.notes.append(f"columns left aside: {', '.join(left)}")
+        self.notes.extend(self.table.notes)
+
+
+def _labelled_by_joints(rows: list[Row], header: Header) -> list[Row]:
+    """Label poses by what was commanded: the same actuator coordinates are one pose."""
+    seen: dict[tuple[float, ...], str] = {}
+    labelled = []
+    for row in rows:
+        if row.nest in header.base_nests or np.isnan(row.q).any():
+            labelled.append(row)
+            continue
+        key = tuple(np.round(row.q, 9))
+        labelled.append(replace(row, pose=seen.setdefault(key, str(len(seen) + 1))))
+    return labelled
+
+
+def _in_order(rows: list[Row], plan: ImportMap, notes: list[str]) -> list[Row]:
+    """Rows in the order of their times; raises BadInput where they are not, unless told to."""
+    if not plan.time.columns:
+        return rows
+    back = 0
+    for before, now in pairwise(rows):
+        if now.station == before.station and now.moment < before.moment:  # type: ignore[operator]
+            back += 1
+            if not plan.time.sort:
+                raise BadInput(
+                    f"time goes back from {before.moment} to {now.moment}", place=now.place,
+                    remedy="Name the files in the order in which they were measured, or write "
+                    "sort = true under [time]",
+                )  # fmt: skip
+    if back:
+        notes.append(f"rows are sorted by their times, which went back {back} times")
+        return sorted(rows, key=lambda row: row.moment)
+    return rows
+
+
+def _run(rows: list[Row], header: Header, tables: Sequence[ForeignTable], plan: ImportMap) -> Run:
+    if not any(row.nest for row in rows):
+        raise BadInput("no row holds a reading", place=rows[0].place, remedy="See [[reading]]")
+    nothing = np.full(3, np.nan)
+    time_s = np.array(seconds_from_start([row.moment for row in rows]))
+    if not plan.time.columns:
+        lines = {line: at for at, line in enumerate(dict.fromkeys(row.place for row in rows))}
+        time_s = plan.time.step_s * np.array([lines[row.place] for row in rows], dtype=np.float64)
+    return Run(
+        header=header,
+        source=tables[0].source if len(tables) == 1 else "points.csv",
+        line=np.array([row.line for row in rows], dtype=np.int64),
+        time_s=time_s,
+        pose=tuple(row.pose for row in rows),
+        nest=tuple(row.nest for row in rows),
+        q=np.round(np.array([row.q for row in rows]).T, 12),
+        measured=np.array([bool(row.nest) for row in rows]),
+        position=np.round(
+            np.array([nothing if row.position is None else row.position for row in rows]).T, 9
+        ),
+        covariance=np.array(
+            [np.full((3, 3), np.nan) if row.covariance is None else row.covariance for row in rows]
+        ).transpose(1, 2, 0),
+        channels={
+            name: np.round([row.channels[name] for row in rows], 9) for name in plan.channels
+        },
+        left_aside={},
+    )

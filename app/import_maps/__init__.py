@@ -1,0 +1,1 @@
+"""Maps that ship: how programs write their tables, read as resources."""
