@@ -89,6 +89,7 @@ def test_its_kind_is_listed_with_its_settings(
     assert [one["name"] for one in found["settings"]] == ["address", "sigma_mm", "silence_s"]
 
 
+@pytest.mark.long
 def test_a_measurement_with_it(
     installed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -139,6 +139,7 @@ def test_effect_that_is_added_falls_silent():
     assert "direction" not in [one["channel"] for one in report["structure"] if one["significant"]]
 
 
+@pytest.mark.long
 def test_proposed_terms_are_written_as_effect_files(tmp_path):
     file = tmp_path / "own.toml"
     answer = CliRunner().invoke(

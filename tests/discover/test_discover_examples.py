@@ -67,6 +67,7 @@ def test_discover_examples_diagnosis_promises_what_the_refit_keeps(capsys):
     assert before["holdout_rms_after_um"] == pytest.approx(after["holdout_rms_um"], rel=1e-3)
 
 
+@pytest.mark.long
 def test_discover_examples_saved_model_begins_the_next_diagnosis(capsys, tmp_path):
     saved = tmp_path / "model.toml"
     run = str(RUNS / "backlash-leg-3")
@@ -76,11 +77,13 @@ def test_discover_examples_saved_model_begins_the_next_diagnosis(capsys, tmp_pat
     assert report["adequate"]
 
 
+@pytest.mark.long
 def test_discover_examples_same_answer_every_time(capsys):
     run = str(RUNS / "no-effect")
     assert answer(capsys, "diagnose", run) == answer(capsys, "diagnose", run)
 
 
+@pytest.mark.long
 def test_discover_examples_what_was_put_in_is_not_called_found(capsys):
     assert pkmcal(["discover", str(RUNS / "backlash-leg-3"), "--add", "tracker-scale"]) == 0
     said = capsys.readouterr().out

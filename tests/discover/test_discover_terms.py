@@ -92,6 +92,7 @@ def quadratic():
     return fit(Model(dataclasses.replace(rows, position=rows.position + shift)))
 
 
+@pytest.mark.long
 def test_proposal_names_the_hidden_formula(quadratic):
     found = propose(quadratic, np.random.default_rng(1))
     assert found[0].formula == "a * s**2"
@@ -99,6 +100,7 @@ def test_proposal_names_the_hidden_formula(quadratic):
     assert found[0].explains_mm > 0.003
 
 
+@pytest.mark.long
 def test_proposal_is_an_effect_file_that_takes_the_misfit_away(quadratic):
     text = propose(quadratic, np.random.default_rng(1))[0].text
     effect = effect_from_text(text, "found.toml")

@@ -94,6 +94,7 @@ def test_identify_whitening_and_back(example):
     )
 
 
+@pytest.mark.long
 def test_identify_predicted_uncertainty_is_true(example):
     """A slice of bench/coverage.py: pooled over parameters, 32 trials."""
     model = Model(example("no-effect"))
@@ -109,6 +110,7 @@ def test_identify_predicted_uncertainty_is_true(example):
     assert np.std(pulls, axis=0) == pytest.approx(1.0, abs=0.4)
 
 
+@pytest.mark.long
 def test_identify_expected_chi_square_and_floors(simulated):
     """The floors are what a perfect model reaches, on average."""
     fits = [fit(Model(simulated(seed)[0])) for seed in range(25)]

@@ -267,6 +267,7 @@ def test_calibration_with_all_errors_and_priors(seed: int) -> None:
     assert after[1] <= 0.006
 
 
+@pytest.mark.long
 def test_calibration_of_the_essential_errors_alone_is_worse() -> None:
     text = files("app.reproduce").joinpath("papers/zhang.toml").read_text()
     essential = tomllib.loads(text)["sensitivity"]["names"]

@@ -45,6 +45,7 @@ def extra(hidden: dict[str, float], extension: list[float]) -> Array:
     return leg_lengths(with_it) - leg_lengths(without)
 
 
+@pytest.mark.long
 def test_errors_of_readings_are_as_large_as_the_tracker_says() -> None:
     w = world()
     sensor = Sensor(w)
@@ -63,6 +64,7 @@ def test_errors_of_readings_are_as_large_as_the_tracker_says() -> None:
     assert np.max(sigmas) < 0.005
 
 
+@pytest.mark.long
 def test_short_dwells_are_honest_too() -> None:
     w = world()
     sensor = Sensor(w)

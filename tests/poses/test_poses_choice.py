@@ -152,6 +152,7 @@ def test_prediction_is_what_simulated_fits_show(pool: PoseSet) -> None:
     assert judge.accuracy(C).position_um == pytest.approx(actual, rel=0.02)
 
 
+@pytest.mark.long
 def test_prediction_holds_for_the_exact_machine(machine: Machine) -> None:
     # Truth from the priors, whole poses read with Han's noise, damped by the priors, exact
     # kinematics throughout: position RMS at fresh poses against what the design predicted.

@@ -43,6 +43,7 @@ def test_the_papers_own_tables_are_whole() -> None:
     assert {e.name for e in study.errors} <= {p.name for p in study.machine.parameters}
 
 
+@pytest.mark.long
 def test_the_command_writes_a_page_with_its_figures(tmp_path: Path) -> None:
     assert run(["reproduce", "--paper", "feng", "--out", str(tmp_path)]) == 0
     page = (tmp_path / "reproduction.md").read_text(encoding="utf-8")

@@ -42,6 +42,7 @@ def changed(site: Path, **hands: Any) -> Path:
     return other
 
 
+@pytest.mark.long
 @pytest.mark.timeout(240)
 def test_the_whole_job_without_a_person(
     site: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -81,6 +82,7 @@ def test_the_whole_job_without_a_person(
         assert station.sets().to_json() == listed
 
 
+@pytest.mark.long
 @pytest.mark.timeout(120)
 def test_script_and_verb_verify_alike(
     site: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -139,6 +141,7 @@ def test_a_job_that_was_stopped_is_gone_on_with(how: str, site: Path, tmp_path: 
     assert done.readings == len(pkmcal.load_runs(done.run).line)
 
 
+@pytest.mark.long
 @pytest.mark.timeout(120)
 def test_an_operator_function_carries_what_the_job_asks_for(site: Path, tmp_path: Path) -> None:
     hands = tomllib.loads(site.read_text("utf-8"))["hands"]
@@ -160,6 +163,7 @@ def test_an_operator_function_carries_what_the_job_asks_for(site: Path, tmp_path
     assert done.readings > 6
 
 
+@pytest.mark.long
 @pytest.mark.timeout(120)
 def test_a_person_who_is_missed_is_said(site: Path, tmp_path: Path) -> None:
     people = changed(site, kind="operator", smrs=3)
@@ -185,6 +189,7 @@ def test_a_fault_in_the_operator_function_stops_the_machine_and_is_raised(
         station.measure(grid(2), warm_up=False)
 
 
+@pytest.mark.long
 @pytest.mark.timeout(120)
 def test_asynchronous_scripts_wait_for_other_things_meanwhile(site: Path, tmp_path: Path) -> None:
     async def work() -> tuple[int, int]:

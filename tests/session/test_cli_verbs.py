@@ -120,6 +120,7 @@ def test_nobody_at_the_address_ends_with_3(
     assert "Check address" in said.err
 
 
+@pytest.mark.long
 def test_an_interrupt_ends_with_4_and_resume_answers_one_json_object(
     mock_of: Callable[..., Mock], tmp_path: Path
 ) -> None:

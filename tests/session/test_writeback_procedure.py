@@ -125,6 +125,7 @@ async def test_a_value_that_reads_back_differently_restores_the_snapshot(
     assert heard.of(ev.WriteBackStage)[-1].stage == "restored"
 
 
+@pytest.mark.long
 async def test_a_refused_store_restores_the_snapshot(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:
@@ -187,6 +188,7 @@ async def test_check_poses_that_are_worse_put_everything_back(
     assert held.values["leg1.L0"] == 230.715
 
 
+@pytest.mark.long
 async def test_a_no_from_the_operator_puts_everything_back(
     mock_of: Callable[..., Mock], tmp_path: Path
 ) -> None:
@@ -280,6 +282,7 @@ class CountsStores:
         await self._controller.reload_parameters()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("breaks", "stores"), [(False, 0), (True, 2)])
 async def test_what_may_have_been_stored_is_put_back_for_good_and_nothing_else_is_stored(
     mock_of: Callable[..., Mock], tmp_path: Path, breaks: bool, stores: int
@@ -307,6 +310,7 @@ async def test_what_may_have_been_stored_is_put_back_for_good_and_nothing_else_i
     assert held.values["leg1.L0"] == 230.715
 
 
+@pytest.mark.long
 async def test_a_stop_during_the_check_poses_puts_everything_back(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:

@@ -60,6 +60,7 @@ def asks_for(bench: Workbench, nest: str) -> bool:
     return prompt is not None and f"nest {nest}" in prompt.text and isinstance(bench.screen, Ask)
 
 
+@pytest.mark.long
 async def test_connect_measure_fit_apply_verify_undo(tmp_path: Path) -> None:
     bench = Workbench(root=tmp_path / "sessions")
     desk = bench.desk
@@ -107,6 +108,7 @@ async def test_connect_measure_fit_apply_verify_undo(tmp_path: Path) -> None:
     assert desk.mock is None
 
 
+@pytest.mark.long
 async def test_questions_are_answered_by_keys_and_a_stop_is_gone_on_with(tmp_path: Path) -> None:
     bench = Workbench(root=tmp_path / "sessions")
     desk = bench.desk

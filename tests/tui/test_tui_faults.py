@@ -40,6 +40,7 @@ async def test_station_that_dies_in_a_run(tmp_path: Path) -> None:
         await desk.close()
 
 
+@pytest.mark.long
 async def test_beam_that_is_broken_is_waited_for(tmp_path: Path) -> None:
     bench = Workbench(root=tmp_path / "sessions")
     desk = bench.desk

@@ -218,6 +218,7 @@ async def test_leaving_asks_while_a_job_runs(bench: Workbench) -> None:
     assert bench.return_code == 0
 
 
+@pytest.mark.long
 async def test_discover_adds_refuses_and_removes(bench: Workbench) -> None:
     run = Path(__file__).parent.parent / "data" / "runs" / "backlash-leg-3"
     study = bench.desk.study
