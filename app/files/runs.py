@@ -58,6 +58,7 @@ def read_run(folder: str | Path) -> LoadedRun:
         run_text,
         read_text(folder / POINTS),
         actuators=len(machine.actuators),
+        units=[actuator.unit for actuator in machine.actuators],
         parameters=[parameter.name for parameter in machine.parameters],
         run_source=run_source,
         points_source=points_source,

@@ -3,7 +3,7 @@
 import csv
 import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +13,7 @@ from calib.errors import BadInput
 from calib.plain_text import plain
 from calib.runs.header import Header, parse_header
 from calib.runs.record import Run
+from calib.runs.spelling import spelled
 
 Array = NDArray[np.float64]
 Cells = list[str]
@@ -29,6 +30,7 @@ def parse_run(
     points_text: str,
     *,
     actuators: int,
+    units: Sequence[str] = (),
     parameters: Collection[str] | None = None,
     run_source: str = "run.toml",
     points_source: str = "points.csv",
@@ -41,6 +43,8 @@ def parse_run(
         Their texts.
     actuators : int
         How many actuators the machine has: columns ``q1`` .. ``qn`` are expected.
+    units : sequence of str, optional
+        "mm" or "rad" of each actuator, to check units that the header states.
     parameters : collection of str, optional
         The machine's parameter names, to check ``[controller.parameters]``.
     run_source, points_source : str
@@ -52,12 +56,19 @@ def parse_run(
         With file, line, column, what was found and what was expected.
     """
     header = parse_header(run_text, source=run_source, parameters=parameters)
-    return parse_points(points_text, header, actuators=actuators, source=points_source)
+    return parse_points(points_text, header, actuators=actuators, units=units, source=points_source)
 
 
-def parse_points(text: str, header: Header, *, actuators: int, source: str = "points.csv") -> Run:
+def parse_points(
+    text: str,
+    header: Header,
+    *,
+    actuators: int,
+    units: Sequence[str] = (),
+    source: str = "points.csv",
+) -> Run:
     """Read ``points.csv`` for a run whose ``run.toml`` is read already; raises BadInput."""
-    table = _Table(text, source)
+    table = _Table(spelled(text, source, units), source)
     n_columns = table.actuator_columns(actuators, header.machine)
     table.require(("time_s", "pose", "nest", *n_columns, *POSITION, *SIGMAS))
     nest = tuple(table.cells("nest"))
@@ -132,12 +143,6 @@ class _Table:
         return rows
 
     def _check_header(self) -> None:
-        if len(self.names) == 1 and re.search(r"[;\t]", self.names[0]):
-            raise BadInput(
-                "columns are separated by semicolons or tabs",
-                place=f"{self.source}, line 1",
-                remedy="Expected commas between columns and a point in numbers",
-            )
         for place, name in enumerate(self.names):
             if not name:
                 raise BadInput(

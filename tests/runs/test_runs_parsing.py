@@ -125,7 +125,7 @@ def test_runs_delay_and_cycle_are_channels_and_unknown_channels_are_welcome():
         (CSV.replace("structure_temp_C", "x"), 1, "x", "appears twice"),
         (CSV.replace("q2", "other"), 1, "q2", "wrong number of actuators"),
         (CSV.replace("structure_temp_C", "q3"), 1, "q3", "wrong number of actuators"),
-        (CSV.replace(",", ";"), 1, "", "semicolons"),
+        (CSV.replace(",", "|"), 1, "", "wrong number of actuators"),
         (CSV.replace(ROWS[1], ROWS[1] + ",1"), 3, "", "13 fields"),
         (CSV.replace("home", '"home'), 6, "", "comma-separated"),
     ],
