@@ -1,9 +1,11 @@
 """How a verb answers: data on standard output, talk on standard error."""
 
 import json
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
@@ -11,8 +13,20 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from app.plain_data import plain
+from app.written import writable
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+class WrittenFile(click.Path):
+    """An option that names a file to be written: checked before the verb does anything."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Take the path if a file can be written there; raises BadInput."""
+        return writable(Path(os.fsdecode(super().convert(value, param, ctx))))
 
 
 def json_option(function: _Function) -> _Function:

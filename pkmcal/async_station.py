@@ -21,9 +21,16 @@ from app.jobs.applying import (
     bring_back,
     known_sets,
 )
-from app.jobs.chosen_runs import File, at_least
+from app.jobs.chosen_runs import File, at_least, path_of
 from app.jobs.measuring import SessionReport, begin_again, begin_measuring, session_report
-from app.jobs.verifying import VerificationReport, begin_verifying, read_before, verification_report
+from app.jobs.verifying import (
+    VerificationReport,
+    begin_verifying,
+    concluded,
+    is_verification,
+    read_before,
+    verification_report,
+)
 from app.session import Outcome, Session
 from app.session import Station as Connection
 from app.session.events import Event, PromptNeeded
@@ -137,7 +144,10 @@ class AsyncStation:
             station=self._connection,
             unattended=self._operator is None,
         )
-        return session_report(await self._run(again))
+        outcome = await self._run(again)
+        if is_verification(again):
+            concluded(outcome.folder)
+        return session_report(outcome)
 
     async def verify(
         self,
@@ -160,6 +170,7 @@ class AsyncStation:
             folder=self.folder,
             truth=truth,
             reference_every=reference_every,
+            before=None if isinstance(before, VerificationReport) else path_of(before),
             station=self._connection,
             unattended=self._operator is None,
         )

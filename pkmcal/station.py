@@ -181,6 +181,8 @@ class Station:
     def resume(self, session: File | None = None) -> SessionReport:
         """Go on where a session was; the latest in ``folder`` if None.
 
+        A verification leaves its verdict as ``verification.json`` in its folder.
+
         Returns
         -------
         SessionReport

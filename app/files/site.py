@@ -104,6 +104,8 @@ class Limits:
     warm_up_K_per_min: float = 0.2
     move_timeout_s: float = 120.0
     """Machine seconds that a move may take."""
+    margin_mm: float = 0.1
+    """Kept free at the ends of strokes when poses are chosen, beyond what tolerances need."""
 
 
 @dataclass(frozen=True)

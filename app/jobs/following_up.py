@@ -18,6 +18,7 @@ from calib.discover.design import CANDIDATES, FollowUpPlan, design_follow_up
 from calib.effects import effect_named
 from calib.errors import BadInput
 from calib.poses.design import labels_for
+from calib.poses.margin import tolerance_margin
 from calib.poses.path import check_path
 
 NOTHING = "nothing"
@@ -126,7 +127,7 @@ def design(
         candidates=candidates,
         watch=watch,
     )
-    if faults := check_path(machine, plan.poses.q):
+    if faults := check_path(machine, plan.poses.q, tolerance_margin(machine)):
         raise BadInput(
             f"the way to pose {faults[0].end} passes a limit ({faults[0].violation})",
             remedy="Choose among other candidates: --seed",

@@ -11,13 +11,15 @@ import numpy as np
 from app.files.machines import load_machine
 from app.files.pose_table import Pose, poses_text
 from app.files.poses import full_poses, nest_matrix, render_design, render_pose_file
-from app.files.site import load_site
+from app.files.site import Limits, load_site
 from app.jobs.chosen_runs import File, at_least, path_of
 from app.jobs.record import Record, Report
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
+from calib.mechanism.limits import Margin
 from calib.poses.design import CANDIDATES, TABLE, Design, design_poses
 from calib.poses.information import Accuracy
+from calib.poses.margin import tolerance_margin
 from calib.poses.readings import HAN_2020, NestReadings, PoseNoise, Readings
 from calib.poses.verification import VerificationGrid, verification_poses
 
@@ -58,8 +60,20 @@ class CountEntry(AccuracyEntry):
 
 
 @dataclass(frozen=True, kw_only=True)
+class KeptFreeEntry(Record):
+    """What is kept free at each end of an actuator's range, in its unit (mm or rad)."""
+
+    actuator: str
+    each_end: float
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class PosesReport(Report):
-    """Chosen poses in the order of a short path, and what they will give (``pkm-design/1``)."""
+    """Chosen poses in the order of a short path, and what they will give (``pkm-design/1``).
+
+    ``kept_free``: what a machine within tolerance needs at the ends of its actuators' ranges.
+    """
 
     FORMAT: ClassVar[str] = "pkm-design/1"
     machine: str
@@ -72,6 +86,7 @@ class PosesReport(Report):
     random_poses: AccuracyEntry
     by_count: tuple[CountEntry, ...]
     path_in_strokes: float
+    kept_free: tuple[KeptFreeEntry, ...]
     poses: tuple[PoseEntry, ...]
     _design: Design = field(repr=False, compare=False)
     _command: str = field(repr=False, compare=False)
@@ -131,6 +146,7 @@ def choose_poses(
     angle_mdeg: float | None = None,
     candidates: int = CANDIDATES,
     seed: int = 1,
+    margin_mm: float | None = None,
 ) -> PosesReport:
     """Choose measurement poses among reachable ones, and predict what accuracy they give.
 
@@ -154,6 +170,8 @@ def choose_poses(
         Reachable poses among which is chosen.
     seed : int
         Draws the candidates.
+    margin_mm : float, optional
+        Kept free at the ends of strokes beyond what the tolerances need; the site's if missing.
 
     Returns
     -------
@@ -175,6 +193,7 @@ def choose_poses(
     named = "" if machine is None else os.fspath(machine)
     path = path_of(site)
     described = _machine(named, path)
+    margin = _margin(described, path, margin_mm)
     found = design_poses(
         described,
         _readings(described, path, sigma_um, angle_mdeg),
@@ -184,6 +203,7 @@ def choose_poses(
         priors=priors,
         candidates=candidates,
         counts=[count for count in TABLE if count <= candidates],
+        margin=margin,
     )
     # What brings the same poses again stands in the file.
     command = (
@@ -194,7 +214,8 @@ def choose_poses(
     command += f" --site {site}" if site else ""
     command += f" --sigma-um {sigma_um:g}" if sigma_um is not None else ""
     command += f" --angle-mdeg {angle_mdeg:g}" if angle_mdeg is not None else ""
-    return PosesReport.of(_said(found, seed), _design=found, _command=command)
+    command += f" --margin-mm {margin_mm:g}" if margin_mm is not None else ""
+    return PosesReport.of(_said(found, seed, margin), _design=found, _command=command)
 
 
 def verification_grid(
@@ -265,6 +286,16 @@ def _readings(
     return PoseNoise(sigma, HAN_2020.angle_sigma if turns else None)
 
 
+def _margin(machine: Machine, site_file: Path | None, margin_mm: float | None) -> Margin:
+    """What tolerances need, and at strokes what effects add to it where the host compensates."""
+    if margin_mm is None:
+        margin_mm = (load_site(site_file).limits if site_file else Limits()).margin_mm
+    if margin_mm < 0.0:
+        raise BadInput(f"--margin-mm is {margin_mm:g}", remedy="Give 0 or more.")
+    strokes = np.array([actuator.unit == "mm" for actuator in machine.actuators])
+    return tolerance_margin(machine).widened(margin_mm * strokes)
+
+
 def _accuracy(accuracy: Accuracy) -> dict[str, float]:
     return {
         "position_rms_um": accuracy.position_um,
@@ -272,7 +303,7 @@ def _accuracy(accuracy: Accuracy) -> dict[str, float]:
     }
 
 
-def _said(design: Design, seed: int) -> dict[str, Any]:
+def _said(design: Design, seed: int, margin: Margin) -> dict[str, Any]:
     """A choice of poses as plain data."""
     names = design.machine.task.coordinates
     return {
@@ -287,6 +318,10 @@ def _said(design: Design, seed: int) -> dict[str, Any]:
         "random_poses": _accuracy(design.random),
         "by_count": [{"n": n, **_accuracy(a)} for n, a in design.by_count],
         "path_in_strokes": design.length,
+        "kept_free": [
+            {"actuator": actuator.name, "each_end": kept, "unit": actuator.unit}
+            for actuator, kept in zip(design.machine.actuators, margin.actuators, strict=True)
+        ],
         "poses": [
             {"label": label, **dict(zip(names, task, strict=True)), "q": q}
             for label, task, q in zip(

@@ -13,10 +13,18 @@ from app.jobs.chosen_runs import File
 from app.jobs.measuring import read_if_file
 from app.jobs.record import Record, Report
 from app.session import Session
+from app.session.folder import JOURNAL
+from app.session.journal import Journal
 from app.session.station import Station
 from app.verification import FORMAT, REFERENCE_EVERY, judge_session, verification_plan
+from app.written import writable
 from calib.errors import BadInput
 from calib.poses import verification_poses
+
+VERDICT = "verification.json"
+"""The answer, in the folder of its session."""
+_ASKED = "verdict"
+"""What the journal remembers: the earlier verification, and where to keep the answer."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,15 +128,77 @@ def begin_verifying(
     folder: Path,
     truth: bool = False,
     reference_every: int = REFERENCE_EVERY,
+    before: Path | None = None,
+    save: Path | None = None,
     station: Station | None = None,
     unattended: bool,
 ) -> Session:
-    """Make a session that visits poses, the verification grid if None; raises BadInput."""
+    """Make a session that visits poses, the verification grid if None.
+
+    ``before`` is an earlier verification to stand beside this one, ``save`` where the answer is to
+    be kept: the session remembers both, so that it ends with them whenever it ends.
+
+    Raises
+    ------
+    BadInput
+        For poses and an earlier verification that cannot be read, and an answer that could not be
+        kept.
+    """
+    _check(before, save)
     chosen = verification_poses(site.machine).by_label if poses is None else poses
     plan = verification_plan(
         site, read_if_file(chosen, site), truth=truth, reference_every=reference_every
     )
-    return Session.create(site, plan, folder, station=station, unattended=unattended)
+    session = Session.create(site, plan, folder, station=station, unattended=unattended)
+    asked = {"before": before, "save": save}
+    session.journal.set_meta(_ASKED, {k: str(p.resolve()) for k, p in asked.items() if p})
+    return session
+
+
+def is_verification(session: Session) -> bool:
+    """Whether a session is to end with a verdict."""
+    return session.plan.purpose == "verify"
+
+
+def check_conclusion(folder: Path) -> None:
+    """See whether a session's verdict can be given and kept, before it goes on; raises BadInput."""
+    _check(*_asked(folder))
+
+
+def concluded(folder: Path) -> VerificationReport:
+    """Judge a finished session as it was asked to be judged, and keep the answer.
+
+    It is kept in the session's folder, and where :func:`begin_verifying` was told.
+
+    Raises
+    ------
+    BadInput
+        Where too little was read.
+    """
+    before, save = _asked(folder)
+    report = verification_report(folder, read_before(before) if before else None)
+    report.save(folder / VERDICT)
+    if save:
+        report.save(save)
+    return report
+
+
+def _check(before: Path | None, save: Path | None) -> None:
+    if before:
+        read_before(before)
+    if save:
+        writable(save)
+
+
+def _asked(folder: Path) -> tuple[Path | None, Path | None]:
+    """The earlier verification, and where the answer is to be kept."""
+    journal = Journal(folder / JOURNAL, read_only=True)
+    try:
+        asked = journal.meta(_ASKED, {})
+    finally:
+        journal.close()
+    before, save = (Path(asked[key]) if key in asked else None for key in ("before", "save"))
+    return before, save
 
 
 def verification_report(

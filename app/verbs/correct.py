@@ -43,7 +43,7 @@ from calib.quantity import quantity
     help="Actuator values, or poses for a controller with parameters of its own.",
 )
 @click.option("--extrapolate", is_flag=True, help="Answer outside of where MODEL was measured.")
-@click.option("--out", type=click.Path(path_type=Path), help="Write the commands to a table.")
+@click.option("--out", type=answer.WrittenFile(), help="Write the commands to a table.")
 @click.option(
     "--serve",
     type=click.IntRange(0, 65535),

@@ -28,7 +28,7 @@ from calib.discover.design import CANDIDATES
 @click.option("--n", "count", default=10, show_default=True, type=click.IntRange(1, 60))
 @click.option("--candidates", default=CANDIDATES, show_default=True, type=click.IntRange(20, 5000))
 @click.option("--seed", default=1, show_default=True, help="Seed of the reachable candidates.")
-@click.option("--out", type=click.Path(path_type=Path), help="Write a poses file for measure.")
+@click.option("--out", type=answer.WrittenFile(), help="Write a poses file for measure.")
 @model_options
 @offer_options
 @answer.json_option

@@ -21,7 +21,7 @@ from app.verbs.diagnose import bad_lines, not_asked, sizes, um
 @model_options
 @offer_options
 @click.option(
-    "--save", type=click.Path(path_type=Path), help="Write the model with what was found to FILE."
+    "--save", type=answer.WrittenFile(), help="Write the model with what was found to FILE."
 )
 @answer.json_option
 def command(

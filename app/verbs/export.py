@@ -22,7 +22,7 @@ from calib.errors import BadInput
     help=f"{', '.join((*PLAIN, *SHIPPED))}, or a template of one's own (FILE.j2).",
 )
 @click.option("--machine", help="Machine file, where it is not the one that MODEL names.")
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write it here.")
+@click.option("--out", type=answer.WrittenFile(), help="Write it here.")
 @click.option("--force", is_flag=True, help="Overwrite the file.")
 def command(model: Path, form: str, machine: str | None, out: Path | None, force: bool) -> None:
     """Write what a controller should hold by MODEL: parameters and the machine's effects.

@@ -19,7 +19,7 @@ from app.show.record_words import excluded_lines, record_lines
 @click.argument("runs", nargs=-1, required=True, metavar="RUN...")
 @model_options
 @click.option(
-    "--save", type=click.Path(path_type=Path), help="Write the model with what was found to FILE."
+    "--save", type=answer.WrittenFile(), help="Write the model with what was found to FILE."
 )
 @answer.json_option
 def command(

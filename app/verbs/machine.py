@@ -55,7 +55,7 @@ def check(machine_name: str, closure: str, seed: int, as_json: bool) -> None:
 @command.command()
 @machine_options
 @click.option("--at", "pose", default="", help='A pose: "x=10 rz=5deg"; home if not given.')
-@click.option("--out", type=click.Path(path_type=Path), help="Write a figure (png, svg, pdf).")
+@click.option("--out", type=answer.WrittenFile(), help="Write a figure (png, svg, pdf).")
 def draw(machine_name: str, closure: str, pose: str, out: Path | None) -> None:
     """Draw limbs and joints: into a figure, or from two sides in the terminal."""
     machine = chosen_machine(machine_name, closure)
@@ -98,7 +98,7 @@ def _configuration(machine: Machine, pose: str) -> Configuration:
 @machine_options
 @click.option(
     "--out",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=answer.WrittenFile(),
     help="Where it is written.  [default: NAME_controller.eds]",
 )
 @click.option("--force", is_flag=True, help="Overwrite the file.")

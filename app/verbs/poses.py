@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 
 from app import answer
 from app.jobs.posing import choose_poses, verification_grid
@@ -45,8 +46,13 @@ from calib.poses.design import CANDIDATES
 @click.option(
     "--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the candidates."
 )
+@click.option(
+    "--margin-mm",
+    type=float,
+    help="Kept free at ends of strokes beyond what tolerances need.  [default: the site's, 0.1]",
+)
 @click.option("--verification", is_flag=True, help="Write the verification grid instead.")
-@click.option("--out", type=click.Path(path_type=Path), help="Write a poses file for measure.")
+@click.option("--out", type=answer.WrittenFile(), help="Write a poses file for measure.")
 @answer.json_option
 def command(
     machine_name: str,
@@ -59,6 +65,7 @@ def command(
     angle_mdeg: float | None,
     candidates: int,
     seed: int,
+    margin_mm: float | None,
     verification: bool,
     out: Path | None,
     as_json: bool,
@@ -66,7 +73,9 @@ def command(
     """Choose measurement poses among reachable ones and predict what accuracy they will give.
 
     The table tells what other numbers of poses would give, so that you can choose. The poses are
-    ordered for a short path; the whole path has been checked against the limits.
+    ordered for a short path; the whole path has been checked against the limits. What a machine
+    within its tolerances needs beyond the drawing is kept free of them, so that the same poses can
+    be measured again once it has been calibrated.
     """
     if machine_name and machine_option:
         raise BadInput("two machines are named", remedy="Give MACHINE or --machine, not both.")
@@ -85,6 +94,7 @@ def command(
             angle_mdeg=angle_mdeg,
             candidates=candidates,
             seed=seed,
+            margin_mm=margin_mm,
         )
     if out:
         chosen.save(out)
@@ -109,8 +119,19 @@ def _text(report: dict[str, Any]) -> str:
         f"{_number(predicted['orientation_rms_mdeg'])} mdeg "
         f"({count} random poses: {_number(report['random_poses']['position_rms_um'])} um)\n"
         f"path: {report['path_in_strokes']:.1f} strokes of the slowest actuator, within all "
-        f"limits\n\n{table}"
+        f"limits\n{_kept_free(report)}\n\n{table}"
     )
+
+
+def _kept_free(report: dict[str, Any]) -> str:
+    """What stays free at the ends of the actuators' ranges, the least and the most."""
+    parts = []
+    for unit, factor, shown in (("mm", 1.0, "mm"), ("rad", float(np.rad2deg(1.0)), "deg")):
+        kept = [factor * one["each_end"] for one in report["kept_free"] if one["unit"] == unit]
+        if kept:
+            least, most = f"{min(kept):.2f}", f"{max(kept):.2f}"
+            parts.append(f"{least} {shown}" if least == most else f"{least} to {most} {shown}")
+    return f"kept free at each end of every range: {', '.join(parts)}"
 
 
 def _number(value: float | None) -> str:

@@ -8,6 +8,8 @@ import click
 from app import answer
 from app.console import run_on_console, unattended
 from app.jobs.measuring import begin_again, session_report
+from app.jobs.verifying import check_conclusion, concluded, is_verification
+from app.show.verification_words import verdict
 
 
 @click.command()
@@ -24,9 +26,16 @@ def command(session_folder: Path | None, folder: Path, alone: bool, as_json: boo
     """Go on where a session was: nothing is lost, nothing is counted twice.
 
     A step that had begun and has no result is in doubt: the controller is asked where the machine
-    was sent, the last reference is read again, and the step is done anew.
+    was sent, the last reference is read again, and the step is done anew. A verification ends with
+    its verdict, beside the earlier one and in the file that it was asked for.
     """
     session = begin_again(session_folder, folder=folder, unattended=unattended(alone))
     answer.say(f"session {session.folder}")
+    if is_verification(session):
+        check_conclusion(session.folder)
+        asyncio.run(run_on_console(session, quiet=as_json))
+        found = concluded(session.folder).to_json()
+        answer.show(found, as_json, verdict(found))
+        return
     report = session_report(asyncio.run(run_on_console(session, quiet=as_json)))
     answer.show(report.to_json(), as_json, f"{report.readings} readings in {report.run}")

@@ -2,15 +2,15 @@
 
 import asyncio
 from pathlib import Path
-from typing import Any
 
 import click
 
 from app import answer
 from app.console import run_on_console, unattended
 from app.files.site import load_site
-from app.jobs.verifying import begin_verifying, read_before, verification_report
+from app.jobs.verifying import begin_verifying, concluded
 from app.report.sources import run_before
+from app.show.verification_words import verdict
 from app.verification import REFERENCE_EVERY
 
 
@@ -38,9 +38,7 @@ from app.verification import REFERENCE_EVERY
     type=click.Path(path_type=Path),
     help="An earlier verification, to stand beside this one.",
 )
-@click.option(
-    "--save", "save_file", type=click.Path(path_type=Path), help="Keep the answer in a file."
-)
+@click.option("--save", "save_file", type=answer.WrittenFile(), help="Keep the answer in a file.")
 @click.option("--unattended", "alone", is_flag=True, help="Nobody answers questions.")
 @click.option(
     "--folder",
@@ -64,49 +62,23 @@ def command(
 
     Peak and standard deviation of the norm of the position error and of the rotation angle, in
     the base frame that the base nests give, beside the peak that the tracker's noise alone would
-    show. Nothing is fitted and nothing is written to the controller.
+    show. Nothing is fitted and nothing is written to the controller. The answer is kept in the
+    session's folder; one that was stopped ends with it after pkmcal resume.
     """
     site = load_site(site_file)
-    before = read_before(before_file) if before_file else None
     session = begin_verifying(
         site,
         poses_file,
         folder=folder,
         truth=truth,
         reference_every=reference_every,
+        before=before_file,
+        save=save_file,
         unattended=unattended(alone),
     )
     answer.say(f"session {session.folder}")
     asyncio.run(run_on_console(session, quiet=as_json))
-    report = verification_report(session.folder, before)
-    if save_file:
-        report.save(save_file)
-    found = report.to_json()
-    answer.show(found, as_json, words(found))
+    found = concluded(session.folder).to_json()
+    answer.show(found, as_json, verdict(found))
     if not as_json and (run := run_before(session.folder)) is not None:
         answer.say(f"the calibration record: pkmcal report {run}")
-
-
-def words(found: dict[str, Any]) -> str:
-    """The table of a verification, with the earlier one and the paper's beside it."""
-    rows: list[tuple[str, ...]] = []
-    views = [("measured", "measured"), *([("truth", "true")] if found["truth"] else [])]
-    for when, data in (("before", found["before"]), ("now", found)):
-        rows += [
-            (
-                f"{name}, {when}",
-                f"{data[key]['position_peak_um']:.1f}",
-                f"{data[key]['position_std_um']:.1f}",
-                f"{data[key]['orientation_peak_deg']:.4f}",
-                f"{data[key]['orientation_std_deg']:.4f}",
-            )
-            for key, name in views
-            if data and data.get(key)
-        ]
-    noise, paper = found["noise_alone"], found["paper"]
-    for name, data in (("tracker noise alone", noise), ("Han et al. 2020, after", paper)):
-        rows.append(
-            (name, f"{data['position_peak_um']:.1f}", "", f"{data['orientation_peak_deg']:.4f}", "")
-        )
-    head = ("", "peak um", "std um", "peak deg", "std deg")
-    return f"{found['poses']} poses\n" + answer.table(head, rows)

@@ -34,6 +34,7 @@ from calib.evidence.problem import LinearProblem
 from calib.evidence.scores import score
 from calib.identify.fitting import Fit
 from calib.identify.signatures import EffectColumns, effect_columns
+from calib.poses.margin import tolerance_margin
 from calib.poses.reach import PoseSet, sample_poses
 
 CANDIDATES = 250
@@ -104,7 +105,8 @@ def design_follow_up(
         If an effect cannot be seen in these runs at all or is in the model already.
     """
     sides = _sides(fit, effects, rng)
-    poses = sample_poses(fit.model.machine, candidates, rng)
+    machine = fit.model.machine
+    poses = sample_poses(machine, candidates, rng, tolerance_margin(machine))
     offered = [_candidate(side, side.now) for side in sides]
     hidden = [side.signature for side in sides]
     before = _chances(fit.problem, offered, hidden, rng)

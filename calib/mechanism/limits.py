@@ -22,28 +22,50 @@ class Violation:
     unit: str
 
 
+@dataclass(frozen=True, eq=False)
+class Margin:
+    """Kept free at both ends of each range: ``actuators`` (n,), ``joints`` (J,), mm or rad."""
+
+    actuators: Array
+    joints: Array
+
+    def widened(self, by: Array) -> "Margin":
+        """The same with ``by`` (n,) more at the actuators."""
+        return Margin(self.actuators + by, self.joints)
+
+
 def _excess(values: Array, low: Array, high: Array) -> BoolArray:
     return (values < low[:, None]) | (values > high[:, None]) | ~np.isfinite(values)
 
 
 def within_limits(
-    machine: Machine, configuration: Configuration, controller: Mapping[str, float] | None = None
+    machine: Machine,
+    configuration: Configuration,
+    controller: Mapping[str, float] | None = None,
+    margin: Margin | None = None,
 ) -> BoolArray:
     """Whether each configuration closes within strokes and joint limits, shape (N,).
 
-    ``controller`` holds the controller's own parameters, to which the actuators refer.
+    ``controller`` holds the controller's own parameters, to which the actuators refer; ``margin``
+    is kept free at the ends of all ranges.
     """
     q = machine.coordinates(configuration.extension, controller)
-    low, high = _joint_limits(machine)
-    inside: BoolArray = configuration.converged & machine.within_stroke(q)
-    inside &= ~np.any(_excess(configuration.passive, low, high), axis=0)
+    inside: BoolArray = configuration.converged.copy()
+    inside &= ~np.any(_excess(q, *_stroke(machine, margin)), axis=0)
+    inside &= ~np.any(_excess(configuration.passive, *_joint_limits(machine, margin)), axis=0)
     return inside
 
 
 def violations(
-    machine: Machine, configuration: Configuration, controller: Mapping[str, float] | None = None
+    machine: Machine,
+    configuration: Configuration,
+    controller: Mapping[str, float] | None = None,
+    margin: Margin | None = None,
 ) -> list[Violation]:
-    """Every limit that is passed, pose by pose; a pose that does not close is one violation."""
+    """Every limit that is passed, pose by pose; a pose that does not close is one violation.
+
+    The limits are those that ``margin`` leaves.
+    """
     found = [
         Violation(int(i), "the pose cannot be reached: the limbs do not close", np.nan, 0, 0, "")
         for i in np.flatnonzero(~configuration.converged)
@@ -51,18 +73,37 @@ def violations(
     q = machine.coordinates(configuration.extension, controller)
     names = [a.name for a in machine.actuators]
     units = [a.unit for a in machine.actuators]
-    low, high = machine.q_limits.T
+    low, high = _stroke(machine, margin)
     found += _named(q, low, high, names, units, configuration.converged)
     names = [f"{limb.name}.{joint.name}" for limb in machine.limbs for joint in limb.joints]
     units = ["rad" if joint.turns else "mm" for joint in machine.joints]
-    low, high = _joint_limits(machine)
+    low, high = _joint_limits(machine, margin)
     found += _named(configuration.passive, low, high, names, units, configuration.converged)
     return sorted(found, key=lambda v: v.pose)
 
 
-def _joint_limits(machine: Machine) -> tuple[Array, Array]:
-    limits = np.array([joint.limits for joint in machine.joints]).reshape(-1, 2)
-    return limits[:, 0], limits[:, 1]
+def kept_at(machine: Machine, configuration: Configuration, margin: Margin) -> Margin:
+    """As much of a margin as one configuration (N = 1) itself keeps, and none where it is past."""
+    q = machine.coordinates(configuration.extension)
+    return Margin(
+        _room(margin.actuators, q[:, 0], *_stroke(machine, None)),
+        _room(margin.joints, configuration.passive[:, 0], *_joint_limits(machine, None)),
+    )
+
+
+def _room(most: Array, values: Array, low: Array, high: Array) -> Array:
+    """Smaller of ``most`` and the distance to the nearer limit, (m,)."""
+    return np.clip(np.minimum(values - low, high - values), 0.0, most)
+
+
+def _stroke(machine: Machine, margin: Margin | None) -> tuple[Array, Array]:
+    low, high = machine.q_limits.T
+    return (low, high) if margin is None else (low + margin.actuators, high - margin.actuators)
+
+
+def _joint_limits(machine: Machine, margin: Margin | None) -> tuple[Array, Array]:
+    low, high = np.array([joint.limits for joint in machine.joints]).reshape(-1, 2).T
+    return (low, high) if margin is None else (low + margin.joints, high - margin.joints)
 
 
 def _named(

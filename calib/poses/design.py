@@ -8,6 +8,7 @@ import numpy as np
 from calib.arrays import Array
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
+from calib.mechanism.limits import Margin
 from calib.poses.choose import Candidates, Criterion, exchange, greedy
 from calib.poses.information import Accuracy, Judge, prior, whitened_rows
 from calib.poses.path import check_path, path_length, short_order
@@ -122,6 +123,7 @@ def design_poses(
     priors: bool = True,
     candidates: int = CANDIDATES,
     counts: Sequence[int] = TABLE,
+    margin: Margin | None = None,
 ) -> Design:
     """Choose measurement poses.
 
@@ -142,6 +144,8 @@ def design_poses(
         Reachable poses among which to choose.
     counts : sequence of int
         Numbers of poses for the table; empty for none.
+    margin : Margin, optional
+        Kept free of all limits by the poses and on the way between them.
 
     Raises
     ------
@@ -154,7 +158,7 @@ def design_poses(
         raise BadInput(
             f"{count} poses of {candidates} candidates", remedy="Ask for fewer poses, at least one."
         )
-    pool = sample_poses(machine, candidates, generator)
+    pool = sample_poses(machine, candidates, generator, margin)
     fresh_poses = sample_poses(machine, FRESH, generator)
     known = prior(pool, readings, priors=priors)
     rows = whitened_rows(pool, readings, known.scale)
@@ -167,7 +171,7 @@ def design_poses(
     table = accuracy_by_count(
         rows, known.information, judge, fresh, counts, criterion=criterion, priors=priors
     )
-    pose_set = ordered(pool.take(np.array(chosen.chosen)))
+    pose_set = ordered(pool.take(np.array(chosen.chosen)), margin)
     return Design(
         pose_set=pose_set,
         labels=labels_for(count),
@@ -182,8 +186,8 @@ def design_poses(
     )
 
 
-def ordered(pose_set: PoseSet) -> PoseSet:
-    """Poses in the order of a short path that stays within limits.
+def ordered(pose_set: PoseSet, margin: Margin | None = None) -> PoseSet:
+    """Poses in the order of a short path that stays within limits, a margin kept free of them.
 
     Raises
     ------
@@ -192,7 +196,7 @@ def ordered(pose_set: PoseSet) -> PoseSet:
     """
     machine = pose_set.machine
     pose_set = pose_set.take(short_order(machine, pose_set.q))
-    faults = check_path(machine, pose_set.q)
+    faults = check_path(machine, pose_set.q, margin)
     if faults:
         fault = faults[0]
         ends = [f"pose {k}" if k else "home" for k in (fault.start, fault.end)]

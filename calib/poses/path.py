@@ -10,7 +10,7 @@ import numpy as np
 
 from calib.arrays import Array, IntArray
 from calib.mechanism.description import Machine
-from calib.mechanism.limits import Violation, violations
+from calib.mechanism.limits import Margin, Violation, kept_at, violations
 from calib.mechanism.solve import forward, home_configuration
 
 SWEEPS = 50
@@ -79,11 +79,11 @@ def path_length(machine: Machine, q: Array) -> float:
     return float(np.sum(np.max(np.abs(np.diff(stops, axis=1)), axis=0)))
 
 
-def check_path(machine: Machine, q: Array) -> list[PathFault]:
+def check_path(machine: Machine, q: Array, margin: Margin | None = None) -> list[PathFault]:
     """Look at the whole way home - q (n, N) - home; every limit that it passes.
 
     The nominal machine is followed along straight lines in actuator space; a place where it does
-    not close counts like a limit.
+    not close counts like a limit. ``margin`` is kept free of the limits, as far as home does.
     """
     stops = np.column_stack([machine.home_q, q, machine.home_q])
     parts = np.max(np.abs(np.diff(stops, axis=1)) / _strokes(machine)[:, None], axis=0)
@@ -91,9 +91,11 @@ def check_path(machine: Machine, q: Array) -> list[PathFault]:
     leg = np.repeat(np.arange(len(counts)), counts)
     share = np.concatenate([np.arange(1, n + 1) / n for n in counts])
     along = stops[:, leg] + share * (stops[:, leg + 1] - stops[:, leg])
-    configuration = forward(machine, machine.extension(along), start=home_configuration(machine))
+    home = home_configuration(machine)
+    configuration = forward(machine, machine.extension(along), start=home)
+    kept = None if margin is None else kept_at(machine, home, margin)
     last = stops.shape[1] - 1
     return [
         PathFault(int(leg[v.pose]), int(leg[v.pose] + 1) % last, v)
-        for v in violations(machine, configuration)
+        for v in violations(machine, configuration, margin=kept)
     ]

@@ -8,7 +8,7 @@ from calib.arrays import Array, BoolArray, Selection
 from calib.errors import BadInput
 from calib.mechanism.configuration import joined
 from calib.mechanism.description import Machine
-from calib.mechanism.limits import within_limits
+from calib.mechanism.limits import Margin, within_limits
 from calib.mechanism.rigid import Poses
 from calib.mechanism.solve import Configuration, inverse
 
@@ -61,11 +61,17 @@ def solve_poses(machine: Machine, task: Array) -> PoseSet:
     return PoseSet(machine, task, inverse(machine, task))
 
 
-def reachable(machine: Machine, configuration: Configuration) -> BoolArray:
-    """Whether poses close, away from singularities, within strokes and joint limits; (N,)."""
+def reachable(
+    machine: Machine, configuration: Configuration, margin: Margin | None = None
+) -> BoolArray:
+    """Whether poses close, away from singularities, within strokes and joint limits; (N,).
+
+    ``margin`` is kept free at the ends of all ranges.
+    """
     q = machine.coordinates(configuration.extension)
     low, high = machine.q_limits.T[:, :, None]
-    inside = within_limits(machine, configuration) & (configuration.conditioning > SINGULAR)
+    inside = within_limits(machine, configuration, margin=margin)
+    inside &= configuration.conditioning > SINGULAR
     inside &= np.all((q >= low + MARGIN) & (q <= high - MARGIN), axis=0)
     return inside
 
@@ -96,7 +102,9 @@ def rounded(machine: Machine, task: Array) -> Array:
     return np.where(lengths, np.round(task, 3), degrees)
 
 
-def sample_poses(machine: Machine, count: int, generator: np.random.Generator) -> PoseSet:
+def sample_poses(
+    machine: Machine, count: int, generator: np.random.Generator, margin: Margin | None = None
+) -> PoseSet:
     """Draw reachable poses, uniform in the workspace box.
 
     Parameters
@@ -106,6 +114,8 @@ def sample_poses(machine: Machine, count: int, generator: np.random.Generator) -
         How many poses are wanted.
     generator : numpy Generator
         The only source of chance: the same generator state gives the same poses.
+    margin : Margin, optional
+        Kept free at the ends of all ranges.
 
     Raises
     ------
@@ -120,7 +130,7 @@ def sample_poses(machine: Machine, count: int, generator: np.random.Generator) -
         batch = int(1.1 * (count - have) / share) + 16
         unit = generator.random((len(low), batch))
         found = solve_poses(machine, rounded(machine, low[:, None] + (high - low)[:, None] * unit))
-        found = found.take(reachable(machine, found.configuration))
+        found = found.take(reachable(machine, found.configuration, margin))
         kept.append(found)
         have, drawn = have + found.count, drawn + batch
         if have >= count:

@@ -6,7 +6,7 @@ shrunk about its centre until every pose is reachable, and what was found is sta
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -14,9 +14,11 @@ import numpy as np
 from calib.arrays import Array
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
+from calib.mechanism.limits import Margin
 from calib.mechanism.rigid import Poses
 from calib.mechanism.solve import home_configuration
 from calib.mechanism.task import task_values
+from calib.poses.margin import tolerance_margin
 from calib.poses.reach import (
     PoseSet,
     reachable,
@@ -35,7 +37,7 @@ POOR = 0.3
 SAMPLES, SEED = 200, 1
 """Reachable poses whose mean is tried as a centre; always the same."""
 SPARE = 0.02
-"""Part of each stroke kept free at its ends: a calibrated machine needs other q for the grid."""
+"""Least part of each stroke kept free at its ends: a calibrated machine needs other q."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,15 +168,20 @@ def _grid(machine: Machine, centre: Array, half: Array, unit: Array, scale: floa
     return solve_poses(machine, rounded(machine, centre[:, None] + scale * half[:, None] * unit))
 
 
+def _spared(machine: Machine) -> Margin:
+    """What is kept free of limits: what tolerances need, and 2 % of each stroke at least."""
+    margin = tolerance_margin(machine)
+    least = SPARE * np.diff(machine.q_limits, axis=1)[:, 0]
+    return replace(margin, actuators=np.maximum(margin.actuators, least))
+
+
 def _largest(machine: Machine, centre: Array, half: Array, unit: Array, room: float) -> float:
     """Largest scale up to ``room`` at which the whole grid is reachable; 0 if none is."""
+    margin = _spared(machine)
 
     def fits(scale: float) -> bool:
         found = _grid(machine, centre, half, unit, scale)
-        low, high = machine.q_limits.T[:, :, None]
-        spare = SPARE * (high - low)
-        inside = np.all((found.q >= low + spare) & (found.q <= high - spare))
-        return bool(inside and np.all(reachable(machine, found.configuration)))
+        return bool(np.all(reachable(machine, found.configuration, margin)))
 
     if fits(room):
         return room

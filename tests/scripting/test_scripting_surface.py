@@ -14,7 +14,7 @@ import pkmcal
 
 SIGNATURES = {
     "choose_poses": "machine=None, n=29, *, site=None, criterion='I', priors=True, sigma_um=None, "
-    "angle_mdeg=None, candidates=2500, seed=1",
+    "angle_mdeg=None, candidates=2500, seed=1, margin_mm=None",
     "compare": "runs, *, add=(), model=None, propose=None, watch=None",
     "correct": "model, poses, *, machine=None, payload=None, temperature=None, channels=None, "
     "every=None, before=None, extrapolate=False",
@@ -68,7 +68,7 @@ FIELDS = {
     "GuessReport": "map columns rows preview assumed missing",
     "ImportReport": "runs machine map rows readings poses assumed record",
     "PosesReport": "machine criterion readings tolerances_as_priors candidates seed predicted "
-    "random_poses by_count path_in_strokes poses",
+    "random_poses by_count path_in_strokes kept_free poses",
     "SessionReport": "session run readings",
     "SetsReport": "sets unknown",
     "SimulationReport": "machine run truth seed poses readings hidden",
