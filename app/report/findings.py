@@ -120,10 +120,13 @@ def _way_blocks(way: Way, effects: Sequence[str]) -> list[Block]:
         )
         if all(step.rms_um is not None for step in way.steps):
             blocks.append(Picture.of(*_staircase(way)))
+    rivals: dict[str, dict[str, None]] = {}
+    for first, *others in way.not_told_apart:
+        if first in effects and others:
+            rivals.setdefault(first, {}).update(dict.fromkeys(others))
     said = [
-        f"{group[0]} was found; these readings cannot tell it from {_or(group[1:])}."
-        for group in way.not_told_apart
-        if len(group) > 1 and group[0] in effects
+        f"{name} was found; these readings cannot tell it from {_or(list(others))}."
+        for name, others in rivals.items()
     ]
     if said:
         blocks.append(Items(tuple(said)))

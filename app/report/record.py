@@ -16,7 +16,7 @@ from app.report.items import (
 )
 from app.report.page import Page, Section
 from app.report.sources import Sources
-from app.report.written import kept_words, written_section
+from app.report.written import kept_words, written_section, written_values
 from calib.identify import Fit
 from calib.identify.reach import reach_of_effects
 from calib.look.judged import record_of
@@ -56,6 +56,8 @@ def record_page(
         statements_section(details, sources),
     )
     appendices = [parameters_section(fit, answer)]
+    if sources.applied is not None:
+        appendices.append(written_values(sources.applied))
     if before or after:
         appendices.append(pose_table(before, after))
     return Page(

@@ -19,15 +19,14 @@ def written_section(
             "Adjustment",
             (Text("Nothing was written to the controller, as far as this record's sources tell."),),
         )
-    said = applied.said
-    changed = [c for c in said["parameters"] if c["new"] != c["old"]]
+    said, count = applied.said, len(_changed(applied))
     blocks: list[Block] = [
         Facts(
             (
                 ("Written", minute(applied.utc)),
                 (
                     "Parameter set",
-                    f"number {said['set']}, {said['held']} values, of which {len(changed)} changed",
+                    f"number {said['set']}, {said['held']} values, of which {count} changed",
                 ),
                 ("Checksum (CRC-32)", f"{said['checksum']:#010x}"),
                 ("Set before", f"number {said['way_back']}, kept"),
@@ -42,6 +41,11 @@ def written_section(
         blocks += [Text("Not written:"), Items(tuple(costs))]
     else:
         blocks.append(Text("All that was found of the machine was written."))
+    return Section("Adjustment", tuple(blocks))
+
+
+def written_values(applied: Entry) -> Section:
+    """Every value that changed, before and after."""
     rows = tuple(
         (
             change["name"],
@@ -49,13 +53,15 @@ def written_section(
             *with_uncertainty(change["new"], COVERAGE * change["sigma"]),
             change["unit"],
         )
-        for change in changed
+        for change in _changed(applied)
     )
     heads = ("parameter", "before", "after", "U (k = 2)", "unit")
-    blocks.append(
-        Table(heads, rows, "Values that changed, as the controller holds them.", words=(4,))
-    )
-    return Section("Adjustment", tuple(blocks))
+    table = Table(heads, rows, "Values that changed, as the controller holds them.", words=(4,))
+    return Section("All values written", (table,))
+
+
+def _changed(applied: Entry) -> list[Mapping[str, Any]]:
+    return [change for change in applied.said["parameters"] if change["new"] != change["old"]]
 
 
 def kept_words(applied: Entry | None, effects: Mapping[str, str]) -> dict[str, str]:
