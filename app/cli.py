@@ -22,6 +22,7 @@ TASKS = (
     ("Identify", ("fit", "compare")),
     ("Find what the model misses", ("diagnose", "discover")),
     ("Correct and prove it", ("apply", "undo", "correct", "export", "verify", "iso9283", "report")),
+    ("Look back", ("sessions", "log", "history")),
     ("Without hardware", ("demo", "mock", "simulate", "reproduce")),
 )
 

@@ -9,6 +9,7 @@ from app.files.staircase import way_of_discovery
 from app.jobs.chosen_runs import File, Runs, names_of, path_of, paths_of
 from app.jobs.fitting import BadReadingEntry, RemarkEntry, keep_model
 from app.jobs.record import Record, Report
+from app.jobs.remembering import remember_fit
 from calib.discover.discovery import discover_run, stage_of
 from calib.discover.report import diagnosis_report, discovery_report
 from calib.evidence.forward import Discovery
@@ -254,4 +255,5 @@ def discover(
     names = names_of(runs)
     refit, begin = load_refitter(names, tuple(add), path_of(model), watch, paths_of(offer))
     found = discover_run(refit, asked_for(refit, begin, add))
+    remember_fit(stage_of(found).run.fit, names)
     return DiscoveryReport.of(discovery_report(found), _found=found, _runs=names)

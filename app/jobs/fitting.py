@@ -10,6 +10,7 @@ from app.files.runs import outside_runs
 from app.files.staircase import Way
 from app.jobs.chosen_runs import File, Runs, names_of, path_of
 from app.jobs.record import Record, Report
+from app.jobs.remembering import remember_fit
 from calib.discover.agreement import runs_at_odds
 from calib.identify import Fit, fit_report
 from calib.identify.staged import fit_effects
@@ -137,6 +138,7 @@ def fit(runs: Runs, *, add: Sequence[str] = (), model: File | None = None) -> Fi
     names = names_of(runs)
     rows, effects = load_rows(names, tuple(add), path_of(model))
     found = fit_effects(rows, effects)
+    remember_fit(found, names)
     odds = runs_at_odds(found)
     said = {
         **fit_report(found),

@@ -21,14 +21,11 @@ from app.report.record import record_page
 from app.report.sources import (
     Checked,
     Sources,
-    Taken,
     read_checked,
-    session_of,
     site_of_session,
-    spans,
-    taken_in,
     verifications_beside,
 )
+from app.session.taken import Taken, session_of, spans, taken_in
 from calib.errors import BadInput
 from calib.identify import Fit, fit_report
 from calib.identify.staged import fit_effects

@@ -6,8 +6,9 @@ from typing import Any
 from app.files.record_details import RecordDetails
 from app.report.accuracy import FOUND, LEFT, Tolerance
 from app.report.page import Block, Facts, Items, Section, Table, Text
-from app.report.sources import Sources, Span, Taken
+from app.report.sources import Sources
 from app.report.words import day, minute, plain
+from app.session.taken import Span, Taken
 from calib.identify import Fit
 
 SIMULATED = "(mock)"

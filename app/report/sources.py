@@ -4,8 +4,8 @@ Everything is read from sessions and files that anyone can read again.
 """
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,32 +17,10 @@ from app.history.store import Entry
 from app.session.folder import JOURNAL, PLAN, RUN, read_folder
 from app.session.journal import IDENTITIES, Journal
 from app.session.plan import Plan
+from app.session.taken import Taken, session_of, taken_in
 from app.verification import FORMAT, judge_session
 from calib.arrays import Array
 from calib.errors import BadInput
-
-
-@dataclass(frozen=True)
-class Span:
-    """Lowest, mean and highest of a channel."""
-
-    low: float
-    mean: float
-    high: float
-
-
-@dataclass(frozen=True)
-class Taken:
-    """When something was measured, by which devices, under which conditions; empty if not known.
-
-    ``begun`` and ``ended`` are ISO 8601, UTC; ``identities`` by role (``controller``, ``tracker``).
-    """
-
-    begun: str = ""
-    ended: str = ""
-    readings: int = 0
-    identities: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
-    channels: Mapping[str, Span] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -87,46 +65,6 @@ class Sources:
     before: Checked | None = None
     after: Checked | None = None
     applied: Entry | None = None
-
-
-def taken_in(session: Path) -> Taken:
-    """How a session was measured, from its journal; raises BadInput if there is none."""
-    journal = Journal(session / JOURNAL, read_only=True)
-    try:
-        rows = journal.rows()
-        readings = [row for row in rows if row.kind == "reading"]
-        names = {name for row in readings for name in row.channels}
-        channels = {
-            name: _span([row.channels[name] for row in readings if name in row.channels])
-            for name in sorted(names)
-        }
-        return Taken(
-            journal.meta("begun_utc", ""),
-            journal.meta("finished_utc", ""),
-            len(readings),
-            journal.meta(IDENTITIES, {}),
-            channels,
-        )
-    finally:
-        journal.close()
-
-
-def session_of(run: str) -> Path | None:
-    """The session that left a run, if the run still lies in it."""
-    session = Path(run).parent
-    return session if (session / JOURNAL).is_file() and (session / PLAN).is_file() else None
-
-
-def spans(columns: Mapping[str, Iterable[Array]]) -> dict[str, Span]:
-    """Ranges of the channels of several runs."""
-    joined = {name: np.concatenate(list(parts)) for name, parts in columns.items()}
-    return {name: _span(values) for name, values in joined.items() if np.isfinite(values).any()}
-
-
-def _span(values: Sequence[float] | Array) -> Span:
-    known = np.asarray(values, dtype=float)
-    known = known[np.isfinite(known)]
-    return Span(float(known.min()), float(known.mean()), float(known.max()))
 
 
 def read_checked(path: Path) -> Checked:

@@ -232,6 +232,11 @@ class Journal:
             (step, state, attempt, time_s, utc, json.dumps(result)),
         )
 
+    def log(self) -> list[tuple[str, float, str, str, dict[str, Any]]]:
+        """Every entry of the log: UTC, time in s, step, state, result."""
+        rows = self._db.execute("SELECT utc, time_s, step, state, result FROM log ORDER BY seq")
+        return [(*tuple(row)[:4], json.loads(row["result"])) for row in rows]
+
     # rows
 
     def add_row(self, step: str, attempt: int, utc: str, row: NewRow) -> int:
@@ -317,6 +322,11 @@ class Journal:
         """Time in s, kind and text of every note."""
         rows = self._db.execute("SELECT time_s, kind, text FROM notes ORDER BY seq")
         return [(row["time_s"], row["kind"], row["text"]) for row in rows]
+
+    def noted(self) -> list[tuple[str, float, str, str]]:
+        """UTC, time in s, kind and text of every note."""
+        rows = self._db.execute("SELECT utc, time_s, kind, text FROM notes ORDER BY seq")
+        return [(row["utc"], row["time_s"], row["kind"], row["text"]) for row in rows]
 
 
 def _row(row: sqlite3.Row) -> Row:

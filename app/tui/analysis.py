@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from app.analysis import load_rows
+from app.jobs.remembering import remember_fit
 from calib.arrays import Array
 from calib.identify import Fit, fit_report
 from calib.identify.staged import fit_effects
@@ -39,7 +40,9 @@ class FitAnswer:
 def identify(runs: tuple[str, ...], effects: tuple[str, ...] = ()) -> FitAnswer:
     """Read runs and fit them; raises :class:`calib.errors.BadInput`."""
     rows, chosen = load_rows(runs, effects)
-    return answer_of(runs, fit_effects(rows, chosen))
+    found = fit_effects(rows, chosen)
+    remember_fit(found, runs)
+    return answer_of(runs, found)
 
 
 def answer_of(runs: tuple[str, ...], found: Fit) -> FitAnswer:

@@ -52,6 +52,9 @@ ASKED: dict[str, tuple[str, ...] | None] = {
     "demo": None,
     "simulate": ("simulate", "tripod", "--poses", "3", "--out", "{}/run"),
     "site kinds": ("site", "kinds"),
+    "sessions": ("sessions", "--folder", "{}"),
+    "log": None,
+    "history": ("history", "--folder", "{}"),
 }
 
 

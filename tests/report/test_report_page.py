@@ -12,8 +12,9 @@ from app.report.accuracy import Tolerance, judge_tolerance
 from app.report.html import html_of
 from app.report.page import Facts, Page, Section, Table, Text
 from app.report.pdf import pdf_of
-from app.report.sources import Checked, Taken
+from app.report.sources import Checked
 from app.report.words import with_uncertainty
+from app.session.taken import Taken
 from calib.errors import BadInput
 
 RUN = Path(__file__).parents[1] / "data" / "runs" / "no-effect"

@@ -1,0 +1,100 @@
+"""The sessions on the disk: what each was, how far it came, and what happened in it."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from app.files.text import read_text
+from app.session.folder import JOURNAL, PLAN
+from app.session.journal import IDENTITIES, Journal
+from calib.errors import BadInput
+
+
+@dataclass(frozen=True)
+class SessionFacts:
+    """One session: ``state`` is ``finished``, ``begun`` (it can be gone on with) or ``broken``.
+
+    ``begun_utc`` and ``finished_utc`` are ISO 8601, "" where they did not come; ``done`` of
+    ``steps`` steps.
+    """
+
+    folder: Path
+    state: str
+    purpose: str
+    machine: str
+    serial: str
+    title: str
+    begun_utc: str
+    finished_utc: str
+    poses: int
+    readings: int
+    done: int
+    steps: int
+
+
+def facts_of(folder: Path) -> SessionFacts:
+    """Read what a session is; one whose files cannot be read is ``broken``."""
+    try:
+        plan = json.loads(read_text(folder / PLAN))
+        journal = Journal(folder / JOURNAL, read_only=True)
+    except (BadInput, ValueError) as error:
+        return SessionFacts(folder, "broken", "", "", "", str(error), "", "", 0, 0, 0, 0)
+    try:
+        finished = str(journal.meta("finished_utc", ""))
+        states = journal.states()
+        return SessionFacts(
+            folder=folder,
+            state="finished" if finished else "begun",
+            purpose=str(plan.get("purpose", "")),
+            machine=str(plan.get("machine", "")),
+            serial=str(journal.meta(IDENTITIES, {}).get("controller", {}).get("serial", "")),
+            title=str(plan.get("title", "")),
+            begun_utc=str(journal.meta("begun_utc", "")),
+            finished_utc=finished,
+            poses=len(plan.get("poses", {})),
+            readings=journal.readings(),
+            done=sum(state.state in ("done", "skipped") for state in states.values()),
+            steps=len(plan.get("steps", ())),
+        )
+    finally:
+        journal.close()
+
+
+def sessions_under(root: Path, most: int | None = None) -> list[SessionFacts]:
+    """The sessions in a folder, the newest first; ``most`` limits how many are looked at."""
+    folders = sorted((path.parent for path in root.glob(f"*/{JOURNAL}")), reverse=True)
+    whole = [folder for folder in folders if not folder.name.startswith("draft-")]
+    return [facts_of(folder) for folder in whole[:most]]
+
+
+@dataclass(frozen=True)
+class Happening:
+    """One line of a session: clock time (ISO 8601, UTC), machine time, what, and its words."""
+
+    utc: str
+    time_s: float
+    kind: str
+    text: str
+
+
+def happenings(folder: Path) -> list[Happening]:
+    """Everything that a session's journal tells, in order; raises BadInput if there is none."""
+    plan = json.loads(read_text(folder / PLAN))
+    says = {step["id"]: step["says"] for step in plan["steps"]}
+    journal = Journal(folder / JOURNAL, read_only=True)
+    try:
+        steps = [
+            Happening(utc, time_s, state, _step_words(says.get(step, step), result))
+            for utc, time_s, step, state, result in journal.log()
+        ]
+        notes = [Happening(utc, time_s, kind, text) for utc, time_s, kind, text in journal.noted()]
+    finally:
+        journal.close()
+    return sorted((*steps, *notes), key=lambda one: one.utc)
+
+
+def _step_words(says: str, result: Mapping[str, Any]) -> str:
+    why = result.get("what") or result.get("why") or ""
+    return f"{says}: {why}" if why else says
