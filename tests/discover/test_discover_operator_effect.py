@@ -234,7 +234,8 @@ def test_actuator_that_does_not_exist_is_said(situation):
 
 def test_example_of_the_docs_works(situation):
     page = Path(__file__).parents[2] / "docs" / "own-effects.md"
-    text = page.read_text(encoding="utf-8").split("```toml\n")[1].split("```")[0]
+    blocks = page.read_text(encoding="utf-8").split("```toml\n")[1:]
+    text = next(block for block in blocks if "[effect]" in block).split("```")[0]
     effect = effect_from_text(text, "docs")
     assert [unknown.name for unknown in effect.unknowns(situation.rows)] == [
         "warming.k",
