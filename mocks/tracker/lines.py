@@ -54,13 +54,14 @@ class LineServer:
                 while not writer.is_closing():
                     await asyncio.sleep(1.0 / LINES_PER_WALL_S)
                     if "tracker-silent" not in self._world.faults:
-                        writer.write(self._line().encode("ascii"))
+                        writer.write(self.line().encode("ascii"))
                         await writer.drain()
         finally:
             self._clients.discard(writer)
             writer.close()
 
-    def _line(self) -> str:
+    def line(self) -> str:
+        """What it says now."""
         if "tracker-lost" in self._world.faults or self._world.smrs.places[SMR] == HAND:
             return "lost\n"
         now = np.array([self._clock.now()])

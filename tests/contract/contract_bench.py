@@ -18,6 +18,7 @@ from drivers.gcs import GcsController
 from drivers.gcs.pose_kind import KIND as POSE
 from drivers.interface import MotionController, Motors, PoseMover, Tracker
 from drivers.kind import ActuatorFacts, Strut, Surroundings
+from drivers.lines.kind import KIND as LINES
 from drivers.linuxcnc.kind import KIND as LINUXCNC
 from drivers.operator.motors import PersonMoves
 from mocks.canopen.bare_site import bare_site
@@ -27,6 +28,7 @@ from mocks.gcs.server import GcsStation
 from mocks.linuxcnc.body import StrutsBody
 from mocks.linuxcnc.server import LinuxCncStation
 from mocks.linuxcnc.site import linuxcnc_site
+from mocks.tracker.lines import LineServer
 from mocks.tracker.server import TrackerServer
 from mocks.world import World, WorldPlan
 
@@ -204,8 +206,38 @@ async def linuxcnc_bench(folder: Path) -> AsyncIterator[ControllerBench]:
         station.stop()
 
 
+@contextlib.asynccontextmanager
+async def lines_bench() -> AsyncIterator[TrackerBench]:
+    """A tracker that sends lines on TCP, through the kind of site files."""
+    clock = ScaledClock(SCALE)
+    world = World(clock, WorldPlan(seed=4, smrs=3))
+    server = LineServer(world, clock)
+    await server.start()
+    stated = {"source": server.address, "sigma_mm": 0.005, "silence_s": 1.0, "unit": "mm"}
+    settings = {one.name: stated.get(one.name, one.default) for one in LINES.settings}
+
+    async def connect() -> Tracker:
+        return await LINES.open(Surroundings(settings, "", "hexapod", (), {}, SCALE))
+
+    async def target() -> tuple[float, float, float]:
+        x, y, z = world.smr_in_tracker("smr1", np.array([clock.now()]))[0]
+        return float(x), float(y), float(z)
+
+    async def hide() -> None:
+        world.faults.inject("tracker-lost")
+
+    async def silence() -> None:
+        world.faults.inject("tracker-silent")
+
+    try:
+        yield TrackerBench(connect, LONGEST_S, target, hide, silence)
+    finally:
+        await server.stop()
+
+
 TRACKERS: dict[str, Callable[..., contextlib.AbstractAsyncContextManager[TrackerBench]]] = {
     "emscon": emscon_bench,
+    "lines": lines_bench,
 }
 CONTROLLERS = {"canopen": "hexapod", "gcs": "tripod"}
 POSE_MOVERS = {"pose": pose_bench}
