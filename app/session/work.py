@@ -20,6 +20,7 @@ from app.session.events import (
 from app.session.hands import nobody_to_ask
 from app.session.journal import PARAMETERS, SMRS, Journal, NewRow
 from app.session.plan import Plan
+from app.session.seen import Seen
 from app.session.station import Station
 from calib.arrays import Array
 from calib.frames import Frame, nest_in_base
@@ -49,6 +50,8 @@ class Memory:
     settled: bool = False
     channels: tuple[float, dict[str, float]] = field(default_factory=lambda: (0.0, {}))
     """When the channels were last asked for (machine s), and the answer."""
+    seen: Seen = field(default_factory=Seen)
+    """By which the next reading is judged."""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import numpy as np
 from app.errors import StoppedByOperator
 from app.files.pose_table import HOME
 from app.session.events import LiveScatter
+from app.session.routines.watching import check_alive
 from app.session.work import Work
 from drivers.errors import BeamBroken, DeviceError, MeasurementError, NoTarget, NotReady
 from drivers.interface import TrackerReading, TrackSample
@@ -19,6 +20,8 @@ _SAMPLE_S = 0.05
 _SAMPLES_PER_WALL_S = 2500.0
 """A fast clock must not flood the wire."""
 _RELOCK_TRIES = 4
+_SPARE_S = 5.0
+"""Wall seconds beyond the tracker's own time after which settling is given up."""
 _RELOCK_WAIT_S = 0.5
 """Wall seconds between tries to find the reflector again."""
 _TRIES = 4
@@ -76,6 +79,24 @@ async def settle(work: Work) -> None:
     if not work.tracker.can.streams:
         await _settled_by_readings(work)
         return
+    # Samples that are no measurement may tell one time for ever, or stay away.
+    patience = work.clock.to_wall(limits.settle_timeout_s) + _SPARE_S
+    try:
+        async with asyncio.timeout(patience):
+            last = await _watch_stream(work)
+    except TimeoutError:
+        last = "; the tracker's samples were none"
+    if not work.memory.settled:
+        raise NotReady(
+            f"the machine does not come to rest within {limits.settle_timeout_s:g} s{last}",
+            device="settling",
+            remedy="Look for vibration or air in the beam, or raise settle_std_mm in the site file",
+        )
+
+
+async def _watch_stream(work: Work) -> str:
+    """Watch samples until the SMR stands or the time is over; what is to be said of the last."""
+    limits, last = work.limits, ""
     separation = max(_SAMPLE_S, work.clock.scale / _SAMPLES_PER_WALL_S)
     count = max(round(limits.settle_window_s / separation), 6)
     window: deque[tuple[float, float, float]] = deque(maxlen=count)
@@ -87,7 +108,9 @@ async def settle(work: Work) -> None:
                 break
             if not sample.valid:
                 window.clear()
+                last = "; the tracker's last sample was no measurement"
                 continue
+            last = ""
             window.append(sample.xyz)
             if len(window) == count:
                 scatter, creep = _scatter(window)
@@ -95,12 +118,8 @@ async def settle(work: Work) -> None:
                 work.tell(LiveScatter(scatter, limits.settle_std_mm, sample.xyz, settled))
                 if settled:
                     work.memory.settled = True
-                    return
-    raise NotReady(
-        f"the machine does not come to rest within {limits.settle_timeout_s:g} s",
-        device="settling",
-        remedy="Look for vibration or air in the beam, or raise settle_std_mm in the site file",
-    )
+                    break
+    return last
 
 
 async def _settled_by_readings(work: Work) -> None:
@@ -169,6 +188,7 @@ async def measured(
             begun = work.clock.now()
             reading = await work.tracker.measure(dwell_s)
             _check_finite(reading)
+            check_alive(work, nest, reading)
             return reading, begun
         except (BeamBroken, NoTarget) as lost:
             if attempt == _TRIES or not patient:

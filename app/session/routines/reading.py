@@ -21,6 +21,7 @@ from app.session.routines.carrying import (
 from app.session.routines.conditions import channels
 from app.session.routines.moving import ensure_at
 from app.session.routines.reverifying import reverify
+from app.session.routines.watching import watch
 from app.session.work import Done, Work
 from drivers.errors import NotReady
 from drivers.interface import TrackerReading
@@ -52,6 +53,7 @@ async def read(work: Work, step: Step) -> Done:
         if not wrong:
             row = reading_row(work, reading, begun, label, nest, state_channels)
             row = _with_cycle(row, step.args.get("cycle"))
+            watch(work, row)
             taken = reading_taken(work, row)
             says = (
                 f"nest {nest}: {1e3 * taken.miss_mm:.0f} um from where the controller's model says"
