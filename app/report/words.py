@@ -1,7 +1,8 @@
 """Numbers and moments as a record prints them."""
 
-import math
 from datetime import datetime
+
+from calib.digits import Digits
 
 MINUS = "−"
 
@@ -12,12 +13,9 @@ def with_uncertainty(value: float, uncertainty: float) -> tuple[str, str]:
     >>> with_uncertainty(230.612345, 0.00481)
     ('230.6123', '0.0048')
     """
-    if not (math.isfinite(uncertainty) and uncertainty > 0.0):
-        return f"{value:.6g}", "–"
-    digits = max(0, 1 - math.floor(math.log10(uncertainty)))
-    if digits > 9:
-        return plain(f"{value:.2e}"), f"{uncertainty:.1e}"
-    return plain(f"{value:.{digits}f}"), f"{uncertainty:.{digits}f}"
+    digits = Digits.of(uncertainty, value)
+    value_text, spread = plain(digits.text(value)), digits.text(uncertainty)
+    return value_text, spread if uncertainty > 0.0 else "–"
 
 
 def plain(text: str) -> str:

@@ -17,6 +17,7 @@ from app.tui.correction import Comparison
 from app.tui.dialogs import Choose, Pick
 from app.tui.face import Face
 from app.tui.picture import Picture
+from calib.digits import Digits, fixed
 
 
 class ApplyFace(Face):
@@ -87,10 +88,11 @@ class ApplyFace(Face):
         names = ("old", "new", "change", "sigmas")
         table.add_columns("name", *(Text(name, justify="right") for name in names))
         for change in comparison.proposal.changes:
-            digits = 4 if change.unit == "mm" else 6
+            digits = Digits.of(change.sigma, change.old, change.new)
+            difference = digits.text(change.new - change.old, signed=True)
             cells = (
-                f"{change.old:10.{digits}f}", f"{change.new:10.{digits}f}",
-                f"{change.new - change.old:+8.{digits}f}", f"{change.in_sigmas:+7.1f}",
+                f"{digits.text(change.old):>10}", f"{digits.text(change.new):>10}",
+                f"{difference:>8}", f"{fixed(change.in_sigmas, 1, signed=True):>7}",
             )  # fmt: skip
             style = "" if change.identified else "dim"
             table.add_row(

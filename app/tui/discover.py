@@ -16,6 +16,7 @@ from app.tui.face import Face
 from app.tui.picture import Picture
 from app.tui.widgets.plots import BinPlot
 from app.tui.wording import p_text
+from calib.digits import plus_minus
 
 STAIRS = 4
 """How many of the last steps are shown."""
@@ -240,8 +241,8 @@ def found_text(view: "View | None") -> Content:
         for each in view.parameters:
             if each["name"].startswith(f"{effect}."):
                 name = each["name"].removeprefix(f"{effect}.")
-                size = f"{each['value']:9.3g} ± {each['sigma']:.1g} {each['unit']}"
-                lines.append(Content(f"  {name:<10}{size}"))
+                size = plus_minus(each["value"], each["sigma"], each["unit"], sign="±")
+                lines.append(Content(f"  {name:<10} {size}"))
     return Content("\n").join(lines)
 
 
@@ -250,7 +251,9 @@ def candidate_row(candidate: dict[str, Any]) -> list[Text]:
     likely = candidate["p_value"] < 0.05
     style = "bold" if likely else "dim"
     held = candidate["holdout_rms_after_um"]
-    sizes = [f"{p['value']:.3g} ± {p['sigma']:.1g} {p['unit']}" for p in candidate["parameters"]]
+    sizes = [
+        plus_minus(p["value"], p["sigma"], p["unit"], sign="±") for p in candidate["parameters"]
+    ]
     more = f" (+{len(sizes) - 1})" if len(sizes) > 1 else ""
     numbers = (
         p_text(candidate["p_value"]),

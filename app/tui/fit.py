@@ -15,6 +15,7 @@ from app.tui.choosing import ask_for_model_file, choose_runs
 from app.tui.face import Face
 from app.tui.picture import Picture
 from app.tui.widgets.plots import PairPlot
+from calib.digits import Digits, fixed
 
 if TYPE_CHECKING:
     from app.tui.analysis import FitAnswer
@@ -190,12 +191,13 @@ def words(answer: "FitAnswer | None") -> Content:
 
 def parameter_row(entry: dict[str, Any], wide: bool) -> list[Text]:
     """Cells of one parameter."""
-    digits = 4 if entry["unit"] == "mm" else 6
     nominal, sigma = entry["nominal"], entry["sigma"]
     change = None if nominal is None else entry["value"] - nominal
-    ratio = "" if change is None or not sigma else f"{change / sigma:+.1f}"
-    cells = [entry["name"], f"{entry['value']:.{digits}f}"] if wide else [entry["name"]]
-    cells += ["" if change is None else f"{change:+.{digits}f}", f"{sigma:.{digits}f}", ratio]
+    ratio = "" if change is None or not sigma else fixed(change / sigma, 1, signed=True)
+    digits = Digits.of(sigma, entry["value"])
+    cells = [entry["name"], digits.text(entry["value"])] if wide else [entry["name"]]
+    cells += ["" if change is None else digits.text(change, signed=True)]
+    cells += [digits.text(sigma), ratio]
     style = "" if entry["identified"] else "dim"
     row = [Text(cells[0], style)]
     row += [Text(cell, style, justify="right") for cell in cells[1:]]

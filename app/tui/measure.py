@@ -19,6 +19,7 @@ from app.tui.planning import NewRun, RunWish, plan_for
 from app.tui.shelf import unfinished
 from app.tui.widgets.plots import MissPlot, ScatterPlot
 from app.tui.widgets.steplist import StepList
+from calib.digits import plus_minus
 from calib.mechanism.axes import Axis
 
 
@@ -192,9 +193,8 @@ def _reading(picture: Picture) -> Content:
     if last is None:
         return Content("-")
     aside = f", {picture.rejected} set aside" if picture.rejected else ""
-    return Content(
-        f"nest {last.nest}: {last.miss_mm * 1000:.0f} µm off ± {last.sigma_mm * 1000:.0f}{aside}"
-    )
+    miss = plus_minus(last.miss_mm * 1000, last.sigma_mm * 1000, "µm", sign="±")
+    return Content(f"nest {last.nest}: off by {miss}{aside}")
 
 
 def _base(picture: Picture) -> Content:

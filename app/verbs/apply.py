@@ -17,6 +17,7 @@ from app.session.station import Station
 from app.writeback.gates import LIMITS, Gates
 from app.writeback.procedure import Applied, WriteBack
 from app.writeback.proposal import Change, Proposal
+from calib.digits import Digits, fixed
 from calib.errors import BadInput
 from calib.pose_error import Summary
 
@@ -132,19 +133,22 @@ def table(proposal: Proposal) -> str:
 
     Of a cyclic table only the entry that changes most is shown: 32 lines a leg hide the rest.
     """
-    rows = [
-        (
-            name, f"{c.old:.5f}", f"{c.new:.5f}", f"{c.new - c.old:+.5f}", f"{c.sigma:.5f}",
-            f"{c.in_sigmas:+.1f}", c.unit, "" if c.identified else "mostly its tolerance",
-        )
-        for name, c in _readable(proposal.changes)
-    ]  # fmt: skip
+    rows = [_row(name, change) for name, change in _readable(proposal.changes)]
     head = ("parameter", "old", "new", "change", "sigma", "in sigmas", "unit", "")
     lines = [answer.table(head, rows)] if rows else ["nothing to change"]
     lines += [f"not written: {name}: {why}" for name, why in proposal.left_out.items()]
     effects = dict.fromkeys(name.split(".")[0] for name in proposal.given_up)
     lines += [f"no longer compensated: {effect}: the fit does not have it" for effect in effects]
     return "\n".join(lines)
+
+
+def _row(name: str, c: Change) -> tuple[str, ...]:
+    digits = Digits.of(c.sigma, c.old, c.new)
+    return (
+        name, digits.text(c.old), digits.text(c.new), digits.text(c.new - c.old, signed=True),
+        digits.text(c.sigma), fixed(c.in_sigmas, 1, signed=True), c.unit,
+        "" if c.identified else "mostly its tolerance",
+    )  # fmt: skip
 
 
 def _readable(changes: Sequence[Change]) -> list[tuple[str, Change]]:

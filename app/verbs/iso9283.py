@@ -17,6 +17,7 @@ from calib.analysis.iso9283 import (
     distance_result,
     pose_result,
 )
+from calib.digits import fixed
 from calib.errors import BadInput
 
 MIXED = 3.0
@@ -132,7 +133,7 @@ def _text(
             pose.label,
             str(found.cycles),
             f"{found.accuracy:.4f}",
-            *(f"{value:+.4f}" for value in found.accuracy_xyz),
+            *(fixed(value, 4, signed=True) for value in found.accuracy_xyz),
             f"{found.repeatability:.4f}",
             *_angle_cells(found),
         ]
@@ -150,8 +151,8 @@ def _text(
             [
                 f"{first} - {second}",
                 f"{d.commanded:.3f}",
-                f"{d.accuracy:+.4f}",
-                *(f"{value:+.4f}" for value in d.accuracy_xyz),
+                fixed(d.accuracy, 4, signed=True),
+                *(fixed(value, 4, signed=True) for value in d.accuracy_xyz),
                 f"{d.repeatability:.4f}",
                 f"{d.allowed:.4f}",
             ]

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from calib.digits import plus_minus
 from calib.discover.diagnosis import RunDiagnosis
 from calib.noise import Component
 
@@ -62,13 +63,13 @@ def _says(found: RunDiagnosis, one: Component) -> str:
         )
     if one.name == "scale":
         return (
-            f"readings scatter {one.value:.2f} +- {one.sigma:.2f} times as much as sx, sy, sz say"
+            f"readings scatter {plus_minus(one.value, one.sigma)} times as much as sx, sy, sz say"
         )
     factor, unit = (1000.0, "um") if unit == "mm" else (1e6, "urad")
     value, sigma = factor * size * one.value, factor * size * one.sigma
     return (
-        f"each visit of a pose errs as a whole, every actuator by {value:.2g} +- {sigma:.1g} "
-        f"{unit}: "
+        "each visit of a pose errs as a whole, every actuator by "
+        f"{plus_minus(value, sigma, unit)}: "
         "the machine repeats no better, or depends on the pose in a way that no column shows "
         "(poses that are visited twice tell)"
     )
@@ -76,5 +77,5 @@ def _says(found: RunDiagnosis, one: Component) -> str:
 
 def _time(value: float, sigma: float) -> str:
     if value >= 120.0:
-        return f"{value / 60.0:.2g} +- {sigma / 60.0:.1g} min"
-    return f"{value:.2g} +- {sigma:.1g} s"
+        return plus_minus(value / 60.0, sigma / 60.0, "min")
+    return plus_minus(value, sigma, "s")

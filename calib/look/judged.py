@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from calib.arrays import IntArray
+from calib.digits import plus_minus
 from calib.effects.component import Effect
 from calib.identify.fitting import Fit
 from calib.identify.readings import MASKED, BadReading
@@ -152,7 +153,7 @@ def judged(effect: Effect, found: Sequence[Estimate], fitted: Fit) -> Iterator[R
     measured = bool({*effect.channels, *effect.depends} & set(fitted.model.rows.channels))
     for one in clear:
         size = one.unknown.size
-        told = f"{one.name} = {one.value:.3g} +- {one.sigma:.2g} {one.unit}"
+        told = f"{one.name} = {plus_minus(one.value, one.sigma, one.unit)}"
         if effect.wrong_sign and one.value < -NOTICEABLE * size:
             yield _mistake("sign-impossible", effect, told, effect.wrong_sign, "negative", source)
         elif abs(one.value) > TOO_LARGE * size:
