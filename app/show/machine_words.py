@@ -7,7 +7,9 @@ import numpy as np
 from app import answer
 from app.show.trait_words import trait_data, trait_words
 from calib.analysis.inspection import Inspection
+from calib.mechanism.check import pose_in_file
 from calib.mechanism.description import Machine
+from calib.mechanism.solve import home_configuration
 from calib.mechanism.variants import closure_names
 from calib.poses.verification import VerificationGrid
 
@@ -33,6 +35,7 @@ def inspection_data(found: Inspection, grid: VerificationGrid) -> dict[str, Any]
         "task": machine.task.coordinates,
         "home_gap_mm": found.home_gap_mm,
         "home_gap_rad": found.home_gap_rad,
+        "home_pose": [float(v) for v in home_configuration(machine).poses.to_xyz_rpy()[:, 0]],
         "constraints": found.constraints,
         "redundant": found.redundant,
         "freedoms_held": found.freedoms_held,
@@ -57,7 +60,7 @@ def inspection_words(found: Inspection, grid: VerificationGrid) -> str:
         f"{machine.name}: {machine.says}",
         _structure(found),
         f"Home: closes {found.home_gap_mm:.2g} mm and {np.rad2deg(found.home_gap_rad):.2g} deg "
-        "from the stated pose.",
+        "from the stated pose:\n  " + pose_in_file(home_configuration(machine).poses),
         _constraints(found),
         _rank(found),
         _singularity(found),

@@ -13,7 +13,7 @@ from calib.mechanism.closure import Closure, Standing, passive_twists
 from calib.mechanism.compiled import compile_machine
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
-from calib.mechanism.rigid import from_euler, logarithm, product
+from calib.mechanism.rigid import Poses, from_euler, logarithm, product
 from calib.mechanism.solve import home_configuration, inverse, settle_limbs
 from calib.mechanism.survey import Survey, closure_at, survey, unit_rows
 from calib.mechanism.task import task_rows, task_values
@@ -200,15 +200,28 @@ def _home(machine: Machine, place: Place) -> None:
     stated = from_euler(*np.array(machine.home[3:]))[:, :, None]
     turn = logarithm(product(home.poses.rotation, np.swapaxes(stated, 0, 1)))[:, 0]
     if max(np.linalg.norm(shift) / machine.size, np.linalg.norm(turn)) > HOME_TOLERANCE:
-        x, y, z = home.poses.position[:, 0]
         raise BadInput(
-            f"at its home actuators the machine closes at x {x:.3f}, y {y:.3f}, z {z:.3f} mm, "
+            f"at its home actuators the machine closes at {pose_in_file(home.poses)}, "
             f"{np.linalg.norm(shift):.3f} mm and {np.degrees(np.linalg.norm(turn)):.3f} deg from "
             f"the stated home pose{_needed(machine)}",
             place=place("home"),
-            remedy="Correct the home pose or the home actuators; if both are right, a limb has a "
-            "wrong frame, or its rough joint angles choose another branch.",
+            remedy="Take that home pose over, or correct the home actuators; if both are right, a "
+            "limb has a wrong frame, or its rough joint angles choose another branch.",
         )
+
+
+def pose_in_file(poses: Poses) -> str:
+    """The first pose as a machine file states it under [home], with all that is not zero."""
+    values = poses.to_xyz_rpy()[:, 0]
+    parts = [f"{name} = {value:.9g}" for name, value in zip("xyz", values[:3], strict=True)]
+    parts += [
+        f'{name} = "{value:.9g} deg"'
+        for name, value in zip(("rx", "ry", "rz"), np.degrees(values[3:]), strict=True)
+    ]
+    size = (1e-9 * max(1.0, float(np.abs(values[:3]).max())),) * 3 + (1e-7,) * 3
+    shown = [part for part, value, least in zip(parts, values, size, strict=True)
+             if abs(value) > least]  # fmt: skip
+    return f"pose = {{ {', '.join(shown)} }}" if shown else "pose = {}"
 
 
 def _softest(rows: Numbers) -> tuple[float, Array]:

@@ -10,6 +10,7 @@ from calib.mechanism.closure import Closure, Standing
 from calib.mechanism.configuration import Configuration
 from calib.mechanism.description import Machine
 from calib.mechanism.householder import Reflectors, factorise
+from calib.mechanism.redundant import extension_steps
 from calib.mechanism.rigid import Poses, exponential, product
 from calib.mechanism.task import task_error, task_rows
 
@@ -74,8 +75,15 @@ class Newton:
         T[:, :3] *= size
         error = task_error(task, self.target, self.state.position, self.state.rotation)
         error = error - np.einsum("tin,in->tn", T, dx)
-        inner = factorise(np.einsum("tin,ian->tan", T, D))
-        ds = inner.solve_triangle(inner.apply_transposed(error))
+        answer = np.einsum("tin,ian->tan", T, D)
+        if answer.shape[0] < answer.shape[1]:
+            held, gaps = closure.rows()
+            strained = np.einsum("rin,in->rn", held, dx) + gaps
+            straining = np.einsum("rin,ian->ran", held, D) - answers
+            ds = extension_steps(answer, error, strained, straining, self._units())
+        else:
+            inner = factorise(answer)
+            ds = inner.solve_triangle(inner.apply_transposed(error))
         return dx + np.einsum("ian,an->in", D, ds), ds
 
     def _limb_steps(
@@ -100,18 +108,21 @@ class Newton:
         """Damping (N,) that bounds the step, and the size of the undamped step (N,)."""
         size = np.max(np.abs(dx), axis=0)
         if ds is not None:
-            units = np.array(
-                [
-                    (self.machine.size if axis.moves == "mm" else 1.0) / axis.ratio
-                    for axis in self.machine.axes
-                ]
-            )
-            size = np.maximum(size, np.max(np.abs(ds) / units[:, None], axis=0))
+            size = np.maximum(size, np.max(np.abs(ds) / self._units()[:, None], axis=0))
         for limb, step in zip(closure.limbs, passive, strict=True):
             if step.size:
                 size = np.maximum(size, np.max(np.abs(step) / limb.group.unit, axis=(0, 1)))
         scale = np.where(size > MAX_STEP, MAX_STEP / size, 1.0)
         return np.where(np.isfinite(size), scale, 0.0), size
+
+    def _units(self) -> Array:
+        """A turn by one rad, or a way as long as the machine, in the unit of each actuator (n,)."""
+        return np.array(
+            [
+                (self.machine.size if axis.moves == "mm" else 1.0) / axis.ratio
+                for axis in self.machine.axes
+            ]
+        )
 
     def _apply(
         self,

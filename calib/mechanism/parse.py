@@ -134,11 +134,12 @@ class _Reader(LimbReader):
                 "coordinates must be a list of x, y, z, rx, ry, rz, or tilt and azimuth",
                 "coordinates",
             )
-        if len(names) != len(self.actuators) or ("tilt" in names) != ("azimuth" in names):
+        if len(names) > len(self.actuators) or ("tilt" in names) != ("azimuth" in names):
             raise task.wrong(
                 f"{len(names)} task coordinates for {len(self.actuators)} actuators",
                 "coordinates",
-                remedy="Name as many coordinates of the pose as there are actuators.",
+                remedy="Name as many coordinates of the pose as there are actuators, or fewer; "
+                "tilt and azimuth go together.",
             )
         return Task(tuple(names))
 
