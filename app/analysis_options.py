@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import click
 
@@ -49,6 +49,30 @@ def offers(offer: tuple[Path, ...], site: Path | None) -> tuple[Path, ...]:
     from app.files.site import load_site  # its devices' kinds: only where a site is named
 
     return (*load_site(site).offers, *offer)
+
+
+def residuals_option(function: _Function) -> _Function:
+    """Give a verb ``--residuals FILE``."""
+    return click.option(
+        "--residuals",
+        type=click.Path(path_type=Path, dir_okay=False),
+        metavar="FILE",
+        help="Write measured minus predicted of every reading, as CSV.",
+    )(function)
+
+
+class Residuals(Protocol):
+    """An answer that can write the residuals behind it."""
+
+    def residuals(self, file: Path) -> None:
+        """Write them."""
+
+
+def written_residuals(found: Residuals, path: Path | None) -> None:
+    """Write residuals where that was asked for, and say so."""
+    if path is not None:
+        found.residuals(path)
+        answer.say(f"residuals written to {path}")
 
 
 def watcher() -> Callable[[tuple[str, ...]], None] | None:

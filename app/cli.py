@@ -17,9 +17,12 @@ VERBS = Path(__file__).parent / "verbs"
 
 # The order in which an operator works; it is the order of ``pkmcal --help``.
 TASKS = (
-    ("Know the machine", ("machine", "poses", "design", "sensitivity", "identifiability")),
+    (
+        "Know the machine",
+        ("machine", "kinematics", "poses", "design", "sensitivity", "identifiability"),
+    ),
     ("Measure", ("site", "measure", "resume", "import")),
-    ("Identify", ("fit", "compare")),
+    ("Identify", ("fit", "compare", "predict")),
     ("Find what the model misses", ("diagnose", "discover")),
     ("Correct and prove it", ("apply", "undo", "correct", "export", "verify", "iso9283", "report")),
     ("Look back", ("sessions", "log", "history")),

@@ -52,11 +52,15 @@ if TYPE_CHECKING:
     from app.jobs.guessing import guess_map as guess_map
     from app.jobs.importing import ImportReport as ImportReport
     from app.jobs.importing import import_run as import_run
+    from app.jobs.kinematics import KinematicsReport as KinematicsReport
+    from app.jobs.kinematics import kinematics as kinematics
     from app.jobs.measuring import SessionReport as SessionReport
     from app.jobs.posing import GridReport as GridReport
     from app.jobs.posing import PosesReport as PosesReport
     from app.jobs.posing import choose_poses as choose_poses
     from app.jobs.posing import verification_grid as verification_grid
+    from app.jobs.predicting import PredictReport as PredictReport
+    from app.jobs.predicting import predict as predict
     from app.jobs.simulating import SimulationReport as SimulationReport
     from app.jobs.simulating import simulate as simulate
     from app.jobs.verifying import VerificationReport as VerificationReport
@@ -82,7 +86,9 @@ _HOMES = {
     "GridReport": "app.jobs.posing",
     "GuessReport": "app.jobs.guessing",
     "ImportReport": "app.jobs.importing",
+    "KinematicsReport": "app.jobs.kinematics",
     "PosesReport": "app.jobs.posing",
+    "PredictReport": "app.jobs.predicting",
     "SessionReport": "app.jobs.measuring",
     "SetsReport": "app.jobs.applying",
     "SimulationReport": "app.jobs.simulating",
@@ -99,9 +105,11 @@ _HOMES = {
     "fit": "app.jobs.fitting",
     "guess_map": "app.jobs.guessing",
     "import_run": "app.jobs.importing",
+    "kinematics": "app.jobs.kinematics",
     "load_machine": "app.files.machines",
     "load_runs": "app.jobs.chosen_runs",
     "mock_station": "pkmcal.mock",
+    "predict": "app.jobs.predicting",
     "simulate": "app.jobs.simulating",
     "verification_grid": "app.jobs.posing",
 }
@@ -123,8 +131,10 @@ __all__ = [
     "GridReport",
     "GuessReport",
     "ImportReport",
+    "KinematicsReport",
     "NameTaken",
     "PosesReport",
+    "PredictReport",
     "SessionReport",
     "SetsReport",
     "SimulationReport",
@@ -141,9 +151,11 @@ __all__ = [
     "fit",
     "guess_map",
     "import_run",
+    "kinematics",
     "load_machine",
     "load_runs",
     "mock_station",
+    "predict",
     "simulate",
     "verification_grid",
 ]

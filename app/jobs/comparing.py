@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from app.analysis import load_refitter
+from app.files.residuals import residuals_of_fit
 from app.files.runs import outside_runs
 from app.jobs.chosen_runs import File, Runs, names_of, path_of
 from app.jobs.fitting import BadReadingEntry, RemarkEntry
@@ -127,6 +128,16 @@ class CompareReport(Report):
         path = Path(folder)
         outside_runs(path, self._runs)
         return write_charts(self._found, path)
+
+    def residuals(self, file: File) -> None:
+        """Write measured minus predicted of every reading as CSV, those left out as well.
+
+        Raises
+        ------
+        BadInput
+            If the file would lie in a run's folder.
+        """
+        residuals_of_fit(Path(file), self._found.fit, self._runs)
 
 
 def compare(

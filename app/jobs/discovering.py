@@ -2,9 +2,11 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import ClassVar
 
 from app.analysis import asked_for, load_refitter
+from app.files.residuals import residuals_of_fit
 from app.files.staircase import way_of_discovery
 from app.jobs.chosen_runs import File, Runs, names_of, path_of, paths_of
 from app.jobs.fitting import BadReadingEntry, RemarkEntry, keep_model
@@ -13,6 +15,7 @@ from app.jobs.remembering import remember_fit
 from calib.discover.discovery import discover_run, stage_of
 from calib.discover.report import diagnosis_report, discovery_report
 from calib.evidence.forward import Discovery
+from calib.identify import Fit
 
 Watch = Callable[[tuple[str, ...]], None]
 """Told the effects of each model that is looked at."""
@@ -127,6 +130,18 @@ class DiagnosisReport(Report):
     unavailable: Mapping[str, str]
     not_on_this_machine: Mapping[str, str]
     advice: str
+    _fit: Fit = field(repr=False, compare=False)
+    _runs: tuple[str, ...] = field(repr=False, compare=False)
+
+    def residuals(self, file: File) -> None:
+        """Write measured minus predicted of every reading as CSV, those left out as well.
+
+        Raises
+        ------
+        BadInput
+            If the file would lie in a run's folder.
+        """
+        residuals_of_fit(Path(file), self._fit, self._runs)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,6 +191,16 @@ class DiscoveryReport(Report):
         way = way_of_discovery(self.to_json())
         keep_model(file, stage_of(self._found).run.fit, self._runs, way)
 
+    def residuals(self, file: File) -> None:
+        """Write measured minus predicted of every reading as CSV, those left out as well.
+
+        Raises
+        ------
+        BadInput
+            If the file would lie in a run's folder.
+        """
+        residuals_of_fit(Path(file), stage_of(self._found).run.fit, self._runs)
+
 
 def diagnose(
     runs: Runs,
@@ -211,8 +236,10 @@ def diagnose(
     >>> asked.adequate, asked.candidates[0].effect                           # doctest: +SKIP
     (False, 'backlash')
     """
-    refit, begin = load_refitter(names_of(runs), tuple(add), path_of(model), watch, paths_of(offer))
-    return DiagnosisReport.of(diagnosis_report(refit(begin).run))
+    names = names_of(runs)
+    refit, begin = load_refitter(names, tuple(add), path_of(model), watch, paths_of(offer))
+    found = refit(begin).run
+    return DiagnosisReport.of(diagnosis_report(found), _fit=found.fit, _runs=names)
 
 
 def discover(

@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import ClassVar
 
 from app.analysis import load_rows
 from app.files.models import write_model
+from app.files.residuals import residuals_of_fit
 from app.files.runs import outside_runs
 from app.files.staircase import Way
 from app.jobs.chosen_runs import File, Runs, names_of, path_of
@@ -67,6 +69,7 @@ class FitReport(Report):
 
     Errors are RMS of the 3D distance between measured and predicted SMR centre in micrometres;
     a ``floor`` is what a perfect model would show; ``holdout`` is over poses that were not fitted.
+    Where it is not ``settled`` the answer is the best point that its ``steps`` came to.
     """
 
     FORMAT: ClassVar[str] = "pkm-fit/1"
@@ -83,6 +86,8 @@ class FitReport(Report):
     bad_readings: tuple[BadReadingEntry, ...]
     left_out_readings: int
     channels_left_aside: Mapping[str, str]
+    settled: bool
+    steps: int
     remarks: tuple[str, ...]
     record: tuple[RemarkEntry, ...]
     _fit: Fit = field(repr=False, compare=False)
@@ -105,6 +110,16 @@ class FitReport(Report):
             compensation.
         """
         keep_model(file, self._fit, self._runs)
+
+    def residuals(self, file: File) -> None:
+        """Write measured minus predicted of every reading as CSV, those left out as well.
+
+        Raises
+        ------
+        BadInput
+            If the file would lie in a run's folder.
+        """
+        residuals_of_fit(Path(file), self._fit, self._runs)
 
 
 def fit(runs: Runs, *, add: Sequence[str] = (), model: File | None = None) -> FitReport:
@@ -142,6 +157,8 @@ def fit(runs: Runs, *, add: Sequence[str] = (), model: File | None = None) -> Fi
     odds = runs_at_odds(found)
     said = {
         **fit_report(found),
+        "settled": found.settled,
+        "steps": found.steps,
         "remarks": [f"{odds}."] if odds else [],
         "record": plain_remarks(record_of(found)),
     }

@@ -9,10 +9,11 @@ from typing import Any
 import click
 
 from app import answer
-from app.analysis_options import model_options, watcher
+from app.analysis_options import model_options, residuals_option, watcher, written_residuals
 from app.files.runs import outside_runs
 from app.jobs.comparing import compare
 from app.show.record_words import excluded_lines, record_lines
+from calib.digits import Digits
 
 SHOWN = 6
 WIDTH = 13
@@ -31,6 +32,7 @@ WIDTH = 13
     type=click.Path(path_type=Path, dir_okay=False),
     help="Look for terms that would explain what is left; write them as effect files (TOML).",
 )
+@residuals_option
 @answer.json_option
 def command(
     runs: tuple[str, ...],
@@ -38,6 +40,7 @@ def command(
     model: Path | None,
     out: Path | None,
     propose: Path | None,
+    residuals: Path | None,
     as_json: bool,
 ) -> None:
     """Compare the fitted model with the readings of RUN...
@@ -48,6 +51,7 @@ def command(
     with --propose, which --add takes.
     """
     outside_runs(out, runs)
+    outside_runs(residuals, runs)
     if propose is not None:
         answer.say("looking for terms, too ...")
     found = compare(runs, add=add, model=model, propose=propose, watch=watcher())
@@ -56,6 +60,7 @@ def command(
     for term in found.proposed:
         if term.file is not None:
             answer.say(f"written {term.file}")
+    written_residuals(found, residuals)
     report = found.to_json()
     answer.show(report, as_json, words(report))
 
@@ -145,5 +150,7 @@ def _picture(one: dict[str, Any]) -> list[str]:
         span = f"{each['from']:.4g}"
         if each["to"] != each["from"]:
             span += f" .. {each['to']:.4g}"
-        lines.append(f"  {span:>22}  {left}|{right} {each['value']:+8.2f} +- {each['sigma']:.2f}")
+        digits = Digits.of(each["sigma"], each["value"])
+        value = digits.text(each["value"], signed=True)
+        lines.append(f"  {span:>22}  {left}|{right} {value:>8} +- {digits.text(each['sigma'])}")
     return lines

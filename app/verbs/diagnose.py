@@ -9,15 +9,25 @@ from typing import Any
 import click
 
 from app import answer
-from app.analysis_options import model_options, offer_options, offers, watcher
+from app.analysis_options import (
+    model_options,
+    offer_options,
+    offers,
+    residuals_option,
+    watcher,
+    written_residuals,
+)
+from app.files.runs import outside_runs
 from app.jobs.discovering import diagnose
 from app.show.record_words import excluded_lines, record_lines
+from calib.digits import plus_minus
 
 
 @click.command()
 @click.argument("runs", nargs=-1, required=True, metavar="RUN...")
 @model_options
 @offer_options
+@residuals_option
 @answer.json_option
 def command(
     runs: tuple[str, ...],
@@ -25,6 +35,7 @@ def command(
     model: Path | None,
     offer: tuple[Path, ...],
     site: Path | None,
+    residuals: Path | None,
     as_json: bool,
 ) -> None:
     """Score every known effect against what the model leaves of RUN...
@@ -32,8 +43,10 @@ def command(
     The answer says which effect is missing, how sure that is, how large it is and what adding it
     would bring; or that nothing is missing; or that something unknown is.
     """
+    outside_runs(residuals, runs)
     with answer.working("testing every known effect"):
         asked = diagnose(runs, add=add, model=model, offer=offers(offer, site), watch=watcher())
+    written_residuals(asked, residuals)
     report = asked.to_json()
     answer.show(report, as_json, words(report))
 
@@ -84,7 +97,7 @@ def not_asked(report: dict[str, Any]) -> list[str]:
 
 def sizes(parameters: list[dict[str, Any]]) -> list[str]:
     """Values with uncertainties in words."""
-    return [f"{p['name']} = {p['value']:.4g} +- {p['sigma']:.2g} {p['unit']}" for p in parameters]
+    return [f"{p['name']} = {plus_minus(p['value'], p['sigma'], p['unit'])}" for p in parameters]
 
 
 def _row(candidate: dict[str, Any]) -> tuple[str, ...]:

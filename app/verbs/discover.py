@@ -9,7 +9,14 @@ from typing import Any
 import click
 
 from app import answer
-from app.analysis_options import model_options, offer_options, offers, watcher
+from app.analysis_options import (
+    model_options,
+    offer_options,
+    offers,
+    residuals_option,
+    watcher,
+    written_residuals,
+)
 from app.files.runs import outside_runs
 from app.jobs.discovering import discover
 from app.show.record_words import record_lines
@@ -23,6 +30,7 @@ from app.verbs.diagnose import bad_lines, not_asked, sizes, um
 @click.option(
     "--save", type=answer.WrittenFile(), help="Write the model with what was found to FILE."
 )
+@residuals_option
 @answer.json_option
 def command(
     runs: tuple[str, ...],
@@ -31,6 +39,7 @@ def command(
     offer: tuple[Path, ...],
     site: Path | None,
     save: Path | None,
+    residuals: Path | None,
     as_json: bool,
 ) -> None:
     """Find the effects that RUN... calls for; those of --add and --model stay in.
@@ -38,11 +47,13 @@ def command(
     An effect is accepted only if poses that the fit has not seen are predicted no worse with it.
     """
     outside_runs(save, runs)
+    outside_runs(residuals, runs)
     with answer.working("looking for effects, adding the best, fitting again"):
         found = discover(runs, add=add, model=model, offer=offers(offer, site), watch=watcher())
     if save is not None:
         found.save(save)
         answer.say(f"model written to {save}")
+    written_residuals(found, residuals)
     report = found.to_json()
     answer.show(report, as_json, words(report))
 

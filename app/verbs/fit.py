@@ -9,10 +9,11 @@ from typing import Any
 import click
 
 from app import answer
-from app.analysis_options import model_options
+from app.analysis_options import model_options, residuals_option, written_residuals
 from app.files.runs import outside_runs
 from app.jobs.fitting import fit
 from app.show.record_words import excluded_lines, record_lines
+from calib.digits import Digits, fixed
 
 
 @click.command()
@@ -21,12 +22,14 @@ from app.show.record_words import excluded_lines, record_lines
 @click.option(
     "--save", type=answer.WrittenFile(), help="Write the model with what was found to FILE."
 )
+@residuals_option
 @answer.json_option
 def command(
     runs: tuple[str, ...],
     add: tuple[str, ...],
     model: Path | None,
     save: Path | None,
+    residuals: Path | None,
     as_json: bool,
 ) -> None:
     """Fit the machine's geometry, the tracker's place and the chosen effects to RUN...
@@ -35,10 +38,12 @@ def command(
     place of the tracker. Nothing is written but the file named with --save.
     """
     outside_runs(save, runs)
+    outside_runs(residuals, runs)
     found = fit(runs, add=add, model=model)
     if save is not None:
         found.save(save)
         answer.say(f"model written to {save}")
+    written_residuals(found, residuals)
     report = found.to_json()
     answer.show(report, as_json, words(report))
 
@@ -63,6 +68,8 @@ def words(report: dict[str, Any]) -> str:
             [_row(entry) for entry in report["parameters"]],
         ),
     ]
+    if not report["settled"]:
+        lines += ["", f"The fit has not settled in {report['steps']} steps: this is its best point"]
     if report["remarks"]:
         lines += ["", *report["remarks"]]
     if report["unidentified_words"]:
@@ -83,13 +90,19 @@ def _um(value: float | None) -> str:
 
 def _row(entry: dict[str, Any]) -> tuple[str, ...]:
     change = None if entry["nominal"] is None else entry["value"] - entry["nominal"]
-    digits = 4 if entry["unit"] == "mm" else 7
+    digits = Digits.of(entry["sigma"], entry["value"])
     return (
         entry["name"],
-        f"{entry['value']:.{digits}f}",
-        f"{entry['sigma']:.{digits}f}",
-        "" if change is None else f"{change:+.{digits}f}",
-        "" if change is None or not entry["sigma"] else f"{change / entry['sigma']:+.1f}",
+        digits.text(entry["value"]),
+        digits.text(entry["sigma"]),
+        "" if change is None else digits.text(change, signed=True),
+        ""
+        if change is None or not entry["sigma"]
+        else fixed(change / entry["sigma"], 1, signed=True),
         entry["unit"],
         "" if entry["identified"] else "not identified",
     )
+
+
+def _in_sigmas(ratio: float) -> str:
+    return fixed(ratio, 1, signed=True)

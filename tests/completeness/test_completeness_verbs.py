@@ -26,6 +26,7 @@ WRITER = runpy.run_path(str(ROOT / "docs" / "make_schemas.py"))
 # How each verb is asked here. On a station: in the tests of the whole job, by the same schemas.
 ASKED: dict[str, tuple[str, ...] | None] = {
     "machine check": ("machine", "check", "ptm"),
+    "kinematics": ("kinematics", "arm", "--inverse", "{}/poses.csv"),
     "poses": ("poses", "tripod", "--n", "6", "--candidates", "12", "--out", "{}/poses.toml"),
     "design": (
         *("design", RUN, "--discriminate", "gravity-sag", "nothing"),
@@ -41,6 +42,7 @@ ASKED: dict[str, tuple[str, ...] | None] = {
     ),
     "fit": ("fit", RUN, "--add", "backlash"),
     "compare": ("compare", RUN),
+    "predict": ("predict", "{}/model.toml", RUN, "--frame"),
     "diagnose": ("diagnose", RUN),
     "discover": ("discover", RUN),
     "apply": None,
@@ -95,7 +97,8 @@ def test_completeness_verb_answers_by_its_schema(
     words = ASKED[name]
     if words is None:
         return
-    if name == "correct":
+    (tmp_path / "poses.csv").write_text("x,y,z,rx,ry [deg],rz\n500,0,830,0,45,0\n")
+    if name in ("correct", "predict"):
         assert run(["fit", RUN, "--save", str(tmp_path / "model.toml")]) == 0
         capsys.readouterr()
     if name == "iso9283":

@@ -26,9 +26,11 @@ SIGNATURES = {
     "guess_map": "files, out, *, machine=None",
     "import_run": "files, map, run, *, machine=None, header=None, commands=None, "
     "as_it_stands=False",
+    "kinematics": "machine, file, direction, *, model=None",
     "load_machine": "name_or_path, relative_to=None",
     "load_runs": "runs",
     "mock_station": "machine='hexapod', *, seed=1, scale=600.0, effects=None, folder=None",
+    "predict": "model, runs, *, frame=False",
     "simulate": "machine, run, *, seed=1, poses=60, noise_um=None, effects=None, hidden=None, "
     "truth=None, parameters=None, controller=None, cycles=1, order='nest-by-nest', payload=(), "
     "rise=6.0, delays=False, strays=0, title=''",
@@ -61,12 +63,16 @@ FIELDS = {
     "bad_readings unavailable parameters refused advice",
     "FitReport": "effects readings chi2_per_dof rms_um noise_floor_um holdout_rms_um "
     "holdout_floor_um parameters unidentified unidentified_words bad_readings left_out_readings "
-    "channels_left_aside remarks record",
+    "channels_left_aside settled steps remarks record",
     "FollowUpReport": "machine discriminate model runs conditions right_now right_then poses "
     "advice",
     "GridReport": "machine workspace_scale box poses",
     "GuessReport": "map columns rows preview assumed missing",
     "ImportReport": "runs machine map rows readings poses assumed record",
+    "KinematicsReport": "machine model direction actuators units places",
+    "PredictReport": "model machine effects frame readings rms_um expected_um noise_um ratio "
+    "chi2_per_dof log10_p p_value axes nests worst not_in_model bad_readings left_out_readings "
+    "remarks record advice",
     "PosesReport": "machine criterion readings tolerances_as_priors candidates seed predicted "
     "random_poses by_count path_in_strokes kept_free poses",
     "SessionReport": "session run readings",
