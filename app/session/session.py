@@ -16,6 +16,7 @@
 
 import asyncio
 import contextlib
+import sqlite3
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -36,13 +37,13 @@ from app.session.events import (
     StepStarted,
     Stopped,
 )
-from app.session.export import export_run
 from app.session.folder import JOURNAL, RUN, make_folder, read_folder
 from app.session.journal import PLANNED, Journal, StepState
 from app.session.plan import Plan, Step
 from app.session.recall import recall
 from app.session.routines import ROUTINES
 from app.session.station import Station
+from app.session.unwritten import UNWRITTEN, export_at_end, unwritten
 from app.session.work import Done, StartOver, Work
 from calib.errors import BadInput
 from drivers.errors import DeviceError
@@ -250,13 +251,19 @@ class Session:
             safe = await self.station.safe_stop()
             if self._stopping:
                 raise self._stopped() from fault
-            self.work.note("fault", str(fault))
+            with contextlib.suppress(sqlite3.Error):
+                self.work.note("fault", str(fault))
             remedy = f"{fault.remedy or 'Put it right'}; then: pkmcal resume {self.folder}"
             self.observers.tell(Fault(fault.what, remedy, safe))
             raise
         except StoppedByOperator:
             await self.station.safe_stop()
             raise self._stopped() from None
+        except UNWRITTEN as error:
+            safe = await self.station.safe_stop()
+            lost = unwritten(error, self.folder)
+            self.observers.tell(Fault(lost.what, lost.remedy, safe))
+            raise lost from error
         except BaseException:
             await self.station.safe_stop()
             raise
@@ -264,9 +271,7 @@ class Session:
             await self._end(watch)
             leave()
             self._driving = None
-            if self.journal.readings():
-                # Also of a session that ended early: what was read is of use already.
-                export_run(self.work.site, self.plan, self.journal, self.folder / RUN)
+            export_at_end(self.work.site, self.plan, self.journal, self.folder)
         return self._finish()
 
     async def _drive(self) -> None:
@@ -344,13 +349,14 @@ class Session:
     async def _end(self, task: "asyncio.Task[None]") -> None:
         """Cancel a task and wait until it has ended; its own error is already known."""
         task.cancel()
-        ended = (asyncio.CancelledError, DeviceError, StoppedByOperator, GateRefused)
+        ended = (asyncio.CancelledError, DeviceError, StoppedByOperator, GateRefused, *UNWRITTEN)
         with contextlib.suppress(*ended):
             await task
 
     def _stopped(self) -> StoppedByOperator:
         remedy = f"Go on with: pkmcal resume {self.folder}"
-        self.work.note("stopped", "by the operator")
+        with contextlib.suppress(sqlite3.Error):
+            self.work.note("stopped", "by the operator")
         self.observers.tell(Stopped(remedy))
         return StoppedByOperator("stopped by the operator; the machine stands", remedy=remedy)
 

@@ -359,3 +359,23 @@ async def test_air_outside_the_band_holds_the_job_and_then_ends_it(
         await run(session)
     assert "the site allows 10 to 12" in heard.of(ev.Suspended)[0].why
     assert not [r for r in heard.of(ev.ReadingTaken) if r.pose_label]
+
+
+async def test_a_full_disk_is_a_sentence_and_the_session_goes_on_when_there_is_room(
+    mock_of: Callable[..., Mock], tmp_path: Path, heard: Heard
+) -> None:
+    mock = mock_of("--smrs", "3")
+    session = begin(mock, tmp_path, heard)
+
+    def fill(event: ev.Event) -> None:
+        if isinstance(event, ev.ReadingTaken) and event.pose_label == "a":
+            used = session.journal._db.execute("PRAGMA page_count").fetchone()[0]
+            session.journal._db.execute(f"PRAGMA max_page_count = {used}")
+
+    session.observers.watch(fill)
+    with pytest.raises(DeviceError, match="disk is full") as full:
+        await run(session)
+    assert str(session.folder) in full.value.remedy
+    assert heard.of(ev.Fault)[-1].safe
+    assert not mock.hands("truth")["moving"]
+    assert await run(await resumed(session)) == 14
