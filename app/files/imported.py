@@ -20,7 +20,7 @@ from calib.runs.record import Run
 CENTRE = "centre"
 """Reference nest in the machine's origin, for directions of what is far away."""
 FAR_MM = 1000.0
-_PIN_MM = 1e-6
+_PIN_MM = 2e-3
 
 
 @dataclass
