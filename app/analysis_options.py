@@ -55,7 +55,7 @@ def residuals_option(function: _Function) -> _Function:
     """Give a verb ``--residuals FILE``."""
     return click.option(
         "--residuals",
-        type=click.Path(path_type=Path, dir_okay=False),
+        type=answer.WrittenFile(),
         metavar="FILE",
         help="Write measured minus predicted of every reading, as CSV.",
     )(function)

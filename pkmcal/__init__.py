@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from app.jobs.chosen_runs import load_runs as load_runs
     from app.jobs.comparing import CompareReport as CompareReport
     from app.jobs.comparing import compare as compare
+    from app.jobs.completing import CompletionReport as CompletionReport
+    from app.jobs.completing import complete as complete
     from app.jobs.correcting import CorrectReport as CorrectReport
     from app.jobs.correcting import correct as correct
     from app.jobs.discovering import DiagnosisReport as DiagnosisReport
@@ -76,6 +78,7 @@ _HOMES = {
     "AsyncStation": "pkmcal.async_station",
     "BadInput": "calib.errors",
     "CompareReport": "app.jobs.comparing",
+    "CompletionReport": "app.jobs.completing",
     "CorrectReport": "app.jobs.correcting",
     "DeviceError": "drivers.errors",
     "DiagnosisReport": "app.jobs.discovering",
@@ -98,6 +101,7 @@ _HOMES = {
     "VerificationReport": "app.jobs.verifying",
     "choose_poses": "app.jobs.posing",
     "compare": "app.jobs.comparing",
+    "complete": "app.jobs.completing",
     "correct": "app.jobs.correcting",
     "design": "app.jobs.following_up",
     "diagnose": "app.jobs.discovering",
@@ -121,6 +125,7 @@ __all__ = [
     "AsyncStation",
     "BadInput",
     "CompareReport",
+    "CompletionReport",
     "CorrectReport",
     "DeviceError",
     "DiagnosisReport",
@@ -144,6 +149,7 @@ __all__ = [
     "VerificationReport",
     "choose_poses",
     "compare",
+    "complete",
     "correct",
     "design",
     "diagnose",

@@ -268,8 +268,9 @@ def machine_of(model: Path, saved: SavedFit, named: str | None) -> Machine:
 
 def _values(saved: SavedFit, machine: Machine) -> dict[str, float]:
     values = {name: estimate.value for name, estimate in saved.estimates.items()}
-    free = [p.name for p in machine.parameters if p.sigma > 0.0]
-    missing = [name for name in free if name not in values]
+    # An error that the machine's file has got since the model was saved is zero, as it is drawn.
+    needed = [p.name for p in machine.parameters if p.sigma > 0.0 and p.nominal != 0.0]
+    missing = [name for name in needed if name not in values]
     unknown = [name for name, value in values.items() if not np.isfinite(value)]
     if missing or unknown:
         raise BadInput(

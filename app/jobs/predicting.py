@@ -155,12 +155,11 @@ def predict(model: File, runs: Runs, *, frame: bool = False) -> PredictReport:
 
 def _same_machine(saved: SavedFit, model: Model) -> None:
     machine = model.machine
-    missing = [p.name for p in machine.parameters if p.name not in saved.estimates]
+    known = any(p.name in saved.estimates for p in machine.parameters)
     named = Path(saved.machine).name.removesuffix(".toml")
-    if (named and named != machine.name) or missing:
-        lacks = f", and lacks {missing[0]}" if missing else ""
+    if (named and named != machine.name) or not known:
         raise BadInput(
-            f'the model is of "{saved.machine}", the run of "{machine.name}"{lacks}',
+            f'the model is of "{saved.machine}", the run of "{machine.name}"',
             place=saved.source,
             remedy="Name a run of the machine that the model is of",
         )

@@ -32,9 +32,7 @@ from calib.errors import BadInput
     "--model", type=click.Path(path_type=Path, dir_okay=False), help="Geometry of a saved model."
 )
 @click.option("--degrees", is_flag=True, help="Angles of the answer in degrees, not in rad.")
-@click.option(
-    "--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the table to FILE (CSV)."
-)
+@click.option("--out", type=answer.WrittenFile(), help="Write the table to FILE (CSV).")
 @answer.json_option
 def command(
     machine: str,

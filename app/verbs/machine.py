@@ -10,8 +10,10 @@ import numpy as np
 from app import answer
 from app.analysis_options import chosen_machine, machine_options
 from app.files.machines import load_machine
+from app.jobs.completing import complete as completed
 from app.machine_templates import TEMPLATES
 from app.show.braille import plain
+from app.show.completion_words import completion_words
 from app.show.machine_drawing import draw_figure, draw_text
 from app.show.machine_words import inspection_data, inspection_words
 from calib.analysis.inspection import inspect
@@ -92,6 +94,32 @@ def _configuration(machine: Machine, pose: str) -> Configuration:
     if not found.converged[0]:
         raise BadInput("the machine does not close at this pose", remedy="Choose a pose in reach.")
     return found
+
+
+@command.command()
+@click.argument("machine_name", metavar="MACHINE")
+@click.option("--tool", is_flag=True, help="Errors behind the last joint of an arm as well.")
+@click.option(
+    "--out",
+    type=answer.WrittenFile(),
+    help="Write the whole machine file with what it lacks.",
+)
+@answer.json_option
+def complete(machine_name: str, tool: bool, out: Path | None, as_json: bool) -> None:
+    """Find the errors that no parameter of a machine file imitates, and propose them.
+
+    Six errors, three places and three directions, are put at the base of every chain and behind
+    every joint; by rank it follows which of them the file's parameters and the base frame do not
+    imitate. They are proposed in the file's own words. Errors behind the last joint of an arm are
+    where the nests are on its flange: with --tool they are proposed, too.
+    """
+    found = completed(machine_name, tool=tool)
+    if out is not None:
+        if out.exists():
+            raise BadInput("there is such a file already", place=str(out), remedy="Name another")
+        out.write_text(found.text, encoding="utf-8", newline="\n")
+        answer.say(f"written to {out}")
+    answer.show(found.to_json(), as_json, completion_words(found.to_json()))
 
 
 @command.command()

@@ -26,7 +26,7 @@ from calib.digits import fixed
 )
 @click.option(
     "--out",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=answer.WrittenFile(),
     help="Write measured minus predicted of every reading to FILE (CSV).",
 )
 @answer.json_option
@@ -84,7 +84,8 @@ def words(report: dict[str, Any]) -> str:
         ),
     ]  # fmt: skip
     if report["not_in_model"]:
-        lines += ["", f"Not in the model, taken as zero: {', '.join(report['not_in_model'])}"]
+        named = ", ".join(report["not_in_model"])
+        lines += ["", f"Not in the model, taken as drawn, uncertain by their tolerance: {named}"]
     if report["bad_readings"]:
         lines += ["", "Excluded readings:", *(f"  {line}" for line in excluded_lines(report))]
     if report["left_out_readings"]:

@@ -26,6 +26,7 @@ WRITER = runpy.run_path(str(ROOT / "docs" / "make_schemas.py"))
 # How each verb is asked here. On a station: in the tests of the whole job, by the same schemas.
 ASKED: dict[str, tuple[str, ...] | None] = {
     "machine check": ("machine", "check", "ptm"),
+    "machine complete": ("machine", "complete", "arm"),
     "kinematics": ("kinematics", "arm", "--inverse", "{}/poses.csv"),
     "poses": ("poses", "tripod", "--n", "6", "--candidates", "12", "--out", "{}/poses.toml"),
     "design": (

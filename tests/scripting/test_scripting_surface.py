@@ -16,6 +16,7 @@ SIGNATURES = {
     "choose_poses": "machine=None, n=29, *, site=None, criterion='I', priors=True, sigma_um=None, "
     "angle_mdeg=None, candidates=2500, seed=1, margin_mm=None",
     "compare": "runs, *, add=(), model=None, propose=None, watch=None",
+    "complete": "machine, *, tool=False",
     "correct": "model, poses, *, machine=None, payload=None, temperature=None, channels=None, "
     "every=None, before=None, extrapolate=False",
     "design": "runs, discriminate, n=10, *, add=(), model=None, offer=(), candidates=250, seed=1, "
@@ -56,6 +57,7 @@ FIELDS = {
     "CompareReport": "effects readings rms_um noise_floor_um chi2_per_dof repeatability "
     "reference_repeatability structure together actuators worst_poses bad_readings record advice "
     "proposed",
+    "CompletionReport": "machine tried parameters rank_before rank_after lacking proposal",
     "CorrectReport": "machine model actuators effects left_out remarks channels poses",
     "DiagnosisReport": "baseline adequate record candidates indistinguishable unexplained noise "
     "bad_readings unavailable not_on_this_machine advice",
