@@ -24,6 +24,10 @@ from drivers.kind import Takes
 
 FORMAT = "pkm-site/1"
 FARTHEST_MM = 1e9
+MAY_BE_ZERO = ("warm_up_s", "margin_mm")
+"""Limits of which nothing at all is a choice; with another at zero nothing could be measured."""
+LEAST_BAND_K = 1.0
+"""The air is to come back by half a kelvin into its band before the job goes on."""
 
 
 @dataclass(frozen=True)
@@ -289,9 +293,17 @@ def _limits(table: TomlTable) -> Limits:
         if isinstance(default, tuple):
             values[name] = table.numbers(name, len(default), default, unit=_unit_in(name))
         else:
+            above = None if name in MAY_BE_ZERO else 0.0
             values[name] = table.number(
-                name, default, unit=_unit_in(name), least=0.0, most=math.inf
+                name, default, unit=_unit_in(name), above=above, least=0.0, most=math.inf
             )
+    low, high = values["air_temp_C"]
+    if high - low <= LEAST_BAND_K:
+        raise table.wrong(
+            f"air_temp_C is {low:g} to {high:g}: no air would ever be right",
+            "air_temp_C",
+            remedy=f"Write the lower limit first, the upper more than {LEAST_BAND_K:g} K above it",
+        )
     table.end()
     return Limits(**values)
 

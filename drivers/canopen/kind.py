@@ -1,6 +1,7 @@
 """The kind ``canopen`` of site files."""
 
 from collections.abc import Mapping
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,9 +66,11 @@ def known_interface(name: str) -> str:
     import can
 
     known = sorted(can.VALID_INTERFACES)
-    return (
-        "" if name in known else f"python-can has no interface {name!r}; it has {', '.join(known)}"
-    )
+    if name in known:
+        return ""
+    near = get_close_matches(name, known, 1)
+    meant = f"Did you mean {near[0]!r}? It" if near else "It"
+    return f"python-can has no interface {name!r}. {meant} has {', '.join(known)}"
 
 
 def _address(settings: Mapping[str, Any]) -> str:
