@@ -18,7 +18,7 @@ from app.files.text import read_text
 from calib.arrays import Array
 from calib.command.region import Region
 from calib.errors import BadInput
-from calib.runs.header import Load, load_of
+from calib.runs.header import Load, load_of, texts_of
 from calib.toml_table import TomlTable
 from calib.unknown import Estimate, Unknown
 
@@ -50,6 +50,8 @@ class SavedFit:
     """A lab's own machine file, from the folder of this one; empty for a shipped machine."""
     controller_serial: str = ""
     """Serial number of the controller on which all runs were taken; empty if it is not known."""
+    controller_frame: Mapping[str, str] = field(default_factory=dict)
+    """What a closed controller's poses referred to in the runs, in its own words."""
     controller: Mapping[str, float] = field(default_factory=dict)
     """The controller's own parameters in the last run; nominal where they are missing."""
     load: Load | None = None
@@ -105,6 +107,7 @@ def fit_of(top: TomlTable, source: str) -> SavedFit:
         own={name: own.text(name) for name in own},
         machine_file=top.text("machine_file", ""),
         controller_serial=top.text("controller_serial", ""),
+        controller_frame=texts_of(top.named("controller_frame", required=False)),
         controller=top.numbers_by_name("controller"),
         load=load_of(top.table("load", required=False)) if top.has("load") else None,
         region=_region(top.table("measured")) if top.has("measured") else None,

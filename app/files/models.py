@@ -11,6 +11,7 @@ from typing import Any
 
 import tomli_w
 
+from app.files.controller_frames import frames_apart
 from app.files.fits import MODEL_FORMAT, read_fit, region_table
 from app.files.machines import shipped_machines
 from app.files.staircase import Way, way_tables
@@ -46,6 +47,26 @@ def compensation_of(fit: Fit) -> dict[str, float]:
     return held[0]
 
 
+def controller_frame(fit: Fit) -> dict[str, str]:
+    """What a closed controller's poses referred to while the runs were taken; empty if untold.
+
+    Raises
+    ------
+    BadInput
+        If it was not the same in all runs: their poses are not of one kind.
+    """
+    told = [run for run in fit.model.rows.runs if run.header.controller_frame]
+    for other in told[1:]:
+        if apart := frames_apart(told[0].header.controller_frame, other.header.controller_frame):
+            raise BadInput(
+                f"the poses of the runs do not refer to the same: {apart[0]}",
+                place=f"{told[0].source} and {other.source}",
+                remedy="Fit runs that were taken with the same pivot and coordinate system, or "
+                "leave --save out",
+            )
+    return dict(told[0].header.controller_frame) if told else {}
+
+
 def controller_serial(fit: Fit) -> str:
     """The controller on which all runs were taken; empty if unknown, or not the same in all."""
     serials = {run.header.controller_serial for run in fit.model.rows.runs}
@@ -66,6 +87,7 @@ def write_model(path: Path, fit: Fit, way: Way = Way()) -> None:  # noqa: B008 -
         "runs": [run.source for run in fit.model.rows.runs],
         "effects": report["effects"],
         "compensation": compensation_of(fit),
+        "controller_frame": controller_frame(fit),
         "own_effects": {
             effect.id: effect.text
             for effect in fit.model.effects

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from app.errors import GateRefused, StoppedByOperator
 from app.files.fits import read_fit
+from app.hosted.controller import HostedController
 from app.session import events as ev
 from app.session.known import Snapshot, compare_with_known
 from app.session.session import Session
@@ -55,13 +56,14 @@ class Corrections:
         """Read the controller and judge the fit on the Fit screen; nothing is written."""
         station = self._desk.idle_station("compare")
         model = self._model_file()
-        held = await compare_with_known(station.site, station.controller)
+        controller = station.controller
+        held = await compare_with_known(station.site, controller)
+        told = await controller.frame() if isinstance(controller, HostedController) else {}
 
         def judge() -> Comparison:
             fit = read_fit(model)
-            proposal, checked = judged(
-                station.site, Gates.with_limits({}), fit, held, station.controller.identity.serial
-            )
+            serial = controller.identity.serial
+            proposal, checked = judged(station.site, Gates.with_limits({}), fit, held, serial, told)
             return Comparison(model, proposal, tuple(checked))
 
         # Arithmetic goes beside the event loop: stop key and drivers must not wait for it.

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.errors import GateRefused
+from app.files.controller_frames import frames_apart
 from app.files.fits import SavedFit
 from app.hosted.command import AT_REFERENCE, BETWEEN_S
 from app.session.events import GateChecked
@@ -27,6 +28,7 @@ from calib.poses import verification_poses
 
 LIMITS: dict[str, float] = {
     "machine": 0.0,
+    "frame": 0.0,
     "finite": 0.0,
     "tolerance": 5.0,
     "chi2": 4.0,
@@ -85,12 +87,18 @@ def gates_of_proposal(
     held: Mapping[str, float],
     hosted: HostedSets | None = None,
     serial: str = "",
+    frame: Mapping[str, str] | None = None,
 ) -> list[GateChecked]:
-    """Everything that can be judged before the controller with this serial number is touched."""
+    """Everything that can be judged before the controller with this serial number is touched.
+
+    ``frame`` is what its poses refer to now, in its own words, where it takes poses.
+    """
     new_values = proposal.values
     odd = [name for name, value in new_values.items() if not math.isfinite(value)]
     odd += [c.name for c in proposal.changes if not math.isfinite(c.sigma) or c.sigma < 0.0]
     checked = [_of_this_machine(gates, fit, serial)]
+    if fit.controller_frame and frame:
+        checked.append(_in_this_frame(gates, fit, frame))
     checked.append(gates.check("finite", len(odd), "", "values that are not finite numbers"))
     if odd:
         return checked
@@ -111,6 +119,13 @@ def gates_of_proposal(
     old = machine.vector({p.name: held[p.name] for p in machine.parameters})
     new = machine.vector({p.name: new_values[p.name] for p in machine.parameters})
     return checked + _over_workspace(gates, machine, fit, old, new, hosted)
+
+
+def _in_this_frame(gates: Gates, fit: SavedFit, frame: Mapping[str, str]) -> GateChecked:
+    """Whether the controller's poses mean what they meant while the runs were taken."""
+    apart = frames_apart(fit.controller_frame, frame)
+    says = "; ".join(apart) or "its poses refer to what they did when it was measured"
+    return gates.check("frame", len(apart), "", says)
 
 
 def _of_this_machine(gates: Gates, fit: SavedFit, serial: str) -> GateChecked:

@@ -15,6 +15,7 @@ from app.files.fits import SavedFit
 from app.files.pose_table import Pose
 from app.files.site import Site
 from app.history.store import Entry, History
+from app.hosted.controller import HostedController
 from app.hosted.parameters import ParameterSet
 from app.session.events import GateChecked, Stage, WriteBackStage
 from app.session.known import Held, Snapshot, compare_with_known
@@ -88,10 +89,11 @@ class WriteBack:
             If the controller does not hold what is known.
         """
         site = self.station.site
-        held = await compare_with_known(site, self.station.controller)
-        proposal, checked = judged(
-            site, self.gates, self.fit, held, self.station.controller.identity.serial
-        )
+        controller = self.station.controller
+        held = await compare_with_known(site, controller)
+        told = await controller.frame() if isinstance(controller, HostedController) else {}
+        serial = controller.identity.serial
+        proposal, checked = judged(site, self.gates, self.fit, held, serial, told)
         for gate in checked:
             self.station.observers.tell(gate)
         refuse_if_any(checked, "Nothing was written. Measure more, or fit again")
@@ -232,11 +234,16 @@ def applied_entry(site: Site, fit: SavedFit, applied: Applied) -> Entry:
 
 
 def judged(
-    site: Site, gates: Gates, fit: SavedFit, held: Held, serial: str = ""
+    site: Site,
+    gates: Gates,
+    fit: SavedFit,
+    held: Held,
+    serial: str = "",
+    frame: Mapping[str, str] | None = None,
 ) -> tuple[Proposal, list[GateChecked]]:
     """What a fit would change in what the controller holds, and every gate before writing.
 
-    ``serial`` is that of the controller that answers.
+    ``serial`` is that of the controller that answers, ``frame`` what its poses refer to.
 
     Raises
     ------
@@ -255,7 +262,9 @@ def judged(
         old = ParameterSet(held.values, held.own)
         new = ParameterSet(proposal.over(held.values), proposal.own)
         sets = HostedSets(*(one.identified(machine, site.load) for one in (old, new)))
-    return proposal, gates_of_proposal(gates, machine, fit, proposal, held.values, sets, serial)
+    return proposal, gates_of_proposal(
+        gates, machine, fit, proposal, held.values, sets, serial, frame
+    )
 
 
 async def _put_back(station: Station, snapshot: Snapshot, *, stored: bool) -> None:

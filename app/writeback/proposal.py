@@ -16,12 +16,10 @@ from pathlib import PurePath
 
 from app.files.fits import SavedFit
 from app.hosted.parameters import effect_of
-from calib.command.identified import commandable
+from calib.command.identified import why_not
 from calib.effects import effect_named
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
-
-NOT_OF_THE_MACHINE = "no effect of the machine that is known here; never written"
 
 
 @dataclass(frozen=True)
@@ -85,8 +83,8 @@ def propose(
     left_out: dict[str, str] = {}
     for effect in fit.effects:
         found = [name for name in fit.estimates if name.startswith(f"{effect}.")]
-        if not _of_the_machine(effect, machine):
-            left_out[effect] = NOT_OF_THE_MACHINE
+        if reason := _not_of_the_machine(effect, machine):
+            left_out[effect] = f"{reason}; never written"
         elif fit.compensation is None and any(held[n] != 0.0 for n in held if n.startswith(effect)):
             left_out[effect] = (
                 "the file does not say what the controller compensated when the run was taken; "
@@ -125,8 +123,8 @@ def _whole_model(
     own: dict[str, str] = {}
     for identifier in fit.effects:
         effect = effect_of(identifier, machine, fit.own)
-        if not commandable(effect):
-            left_out[identifier] = NOT_OF_THE_MACHINE
+        if reason := why_not(effect):
+            left_out[identifier] = f"{reason}; never written"
             continue
         names = [name for name in fit.estimates if name.startswith(f"{identifier}.")]
         changes += [_change(fit, name, held, 0.0) for name in names]
@@ -159,12 +157,12 @@ def _same_machine(said: str, machine: Machine) -> bool:
     return said == machine.name or PurePath(said).name == PurePath(machine.source).name
 
 
-def _of_the_machine(effect: str, machine: Machine) -> bool:
-    """Whether an effect is known to belong to the machine; an operator's own one is not."""
+def _not_of_the_machine(effect: str, machine: Machine) -> str:
+    """Why nothing of an effect can be in any controller; empty if it is the machine's own."""
     try:
-        return effect_named(effect, machine).kind == "machine"
+        return why_not(effect_named(effect, machine))
     except BadInput:
-        return False
+        return "an effect of your own: a controller knows nothing of it"
 
 
 def _change(fit: SavedFit, name: str, held: Mapping[str, float], add_to: float) -> Change:

@@ -109,12 +109,13 @@ def contents_of(top: TomlTable, parameters: Collection[str] | None = None) -> He
         controller_serial=controller.text("serial", ""),
         controller_parameters=_controller_parameters(controller, parameters),
         compensation=controller.numbers_by_name("compensation"),
-        controller_frame=_texts(controller.named("frame", required=False)),
+        controller_frame=texts_of(controller.named("frame", required=False)),
         load=load_of(top.table("load", required=False)) if top.has("load") else None,
     )
 
 
-def _texts(table: TomlTable) -> dict[str, str]:
+def texts_of(table: TomlTable) -> dict[str, str]:
+    """Every text of a table by its name; raises BadInput for what is none."""
     table.note("", Asked("text", "", False, None))
     return {name: table.text(name) for name in table}
 

@@ -210,3 +210,41 @@ def test_check_poses_must_be_good_and_better() -> None:
     assert [gate.gate for gate in checked if not gate.passed] == ["check-peak", "check-rms"]
     with pytest.raises(GateRefused, match="check-peak"):
         refuse_if_any(checked, "measure more")
+
+
+@pytest.mark.parametrize(
+    ("now", "apart"),
+    [
+        ({"pivot": "0 0 0", "system": "ZERO", "rotation": "zyx"}, 0),
+        ({"pivot": "0.0 0.0 0.0", "system": "ZERO"}, 0),
+        ({"pivot": "0 0 50", "system": "ZERO"}, 1),
+        ({"pivot": "0 0 50", "system": "LAB"}, 2),
+        ({}, 0),
+    ],
+)
+def test_poses_that_refer_to_something_else_than_when_it_was_measured_are_refused(
+    now: dict[str, str], apart: int
+) -> None:
+    frame = {"pivot": "0 0 0", "system": "ZERO", "rotation": "zyx"}
+    fit = replace(made(), controller_frame=frame)
+    proposal = propose(MACHINE, fit, HELD)
+    checked = gates_of_proposal(GATES, MACHINE, fit, proposal, HELD, frame=now)
+    refused = [gate for gate in checked if not gate.passed]
+    assert [gate.gate for gate in refused] == ["frame"] * bool(apart)
+    if apart:
+        assert "pivot was 0 0 0, and is 0 0 50" in refused[0].says
+        assert refused[0].value == apart
+
+
+@pytest.mark.parametrize(
+    ("effect", "reason"),
+    [
+        ("tracker-scale", "of the measurement"),
+        ("actuator-step", "it happened in that run"),
+        ("bent-rail", "your own"),
+        ("gravity-sag", "no compensation for it"),
+    ],
+)
+def test_what_is_not_written_says_exactly_why(effect: str, reason: str) -> None:
+    left_out = propose(MACHINE, made(effects=(effect,)), HELD).left_out
+    assert reason in left_out[effect]
