@@ -111,6 +111,12 @@ async def test_a_step_in_work_is_left_out_unless_safety_needs_it(
     assert [event.why for event in heard.of(ev.StepSkipped)] == ["in a hurry"] * kind.skippable
 
 
+def test_what_no_journal_holds_is_done_every_time() -> None:
+    """Who answers, whether the path is free, a ready tracker and drives that hold the machine."""
+    every_time = {kind.name for kind in KINDS.values() if kind.every_time}
+    assert every_time == {"connect", "check-path", "tracker", "drives"}
+
+
 def test_what_safety_needs() -> None:
     needed = {kind.name for kind in KINDS.values() if not kind.skippable}
     assert needed == {"connect", "check-path", "tracker", "drives", "rest"}
