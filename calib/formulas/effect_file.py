@@ -7,11 +7,9 @@
     expression = "k * s**2"
     unknowns = { k = "1/mm" }         # one for each actuator unless shared = true
 
-For actuators the formula may use ``s``, ``q``, ``l`` (commanded extension, coordinate, length of
-that actuator), ``direction`` and ``step`` of its last move, the same of a particular one (``s1``,
-``q2`` ...), ``t`` (s from the start of the run) and any channel by its column's name. For points
-(tracker frame, mm) there are ``x``, ``y``, ``z``, ``range``, ``azimuth``, ``elevation``, ``t`` and
-the channels; one formula acts along the line of sight, a list of three along x, y and z.
+What a formula may name is in docs/own-effects.md, and in ``functions.py``. For points one formula
+acts along the line of sight, a list of three along x, y and z of ``frame`` (tracker, base or
+platform).
 
 ``axes = ["leg1", "leg4"]`` leaves all other actuators alone: where linear and rotary ones are
 mixed, an unknown has a unit only among actuators of one unit.
@@ -26,17 +24,13 @@ import re
 
 from calib.effects.component import Kind
 from calib.errors import BadInput
-from calib.formulas.expression import (
-    CONSTANTS,
-    FUNCTIONS,
-    Expression,
-    parse_expression,
-    vanishes_without,
-)
-from calib.formulas.formula_effect import NUMBERED, OWN, POINT, TRIALS, OperatorEffect
+from calib.formulas.expression import Expression, parse_expression, vanishes_without
+from calib.formulas.formula_effect import OF_ONE, TRIALS, Declared, OperatorEffect
+from calib.formulas.functions import CONSTANTS, FUNCTIONS, LABELS, OWN, POINT, POSE, SEVERAL
 from calib.toml_table import TomlTable
 from calib.unknown import Unknown
 
+FRAMES = ("tracker", "base", "platform")
 KINDS = ("machine", "measurement")
 
 
@@ -63,24 +57,25 @@ def effect_of(top: TomlTable, text: str, source: str) -> OperatorEffect:
     if not top.has("effect"):
         raise BadInput("there is no table [effect]", place=source, remedy="Begin with [effect]")
     table = top.table("effect")
-    table.only("id", "says", "acts_on", "expression", "unknowns", "shared", "kind", "axes")
+    table.only("id", "says", "acts_on", "expression", "unknowns", "shared", "kind", "axes", "frame")
     acts_on = table.choice("acts_on", ("actuator", "point"), "actuator")
     usual = "machine" if acts_on == "actuator" else "measurement"
     kind: Kind = "machine" if table.choice("kind", KINDS, usual) == "machine" else "measurement"
-    declared = _unknowns(table)
-    effect = OperatorEffect(
+    unknowns, shared = _unknowns(table)
+    declared = Declared(
         _identifier(table),
         table.text("says", "an operator's own effect"),
         kind,
-        _expressions(table, acts_on),
-        declared,
-        table.flag("shared", False),
+        unknowns,
+        frozenset(one.name for one in unknowns) if table.flag("shared", False) else shared,
         acts_on,
         source,
         _axes(table, acts_on),
+        _frame(table, acts_on),
         text,
     )
-    _check(effect, declared, table)
+    effect = OperatorEffect(declared, _expressions(table, acts_on))
+    _check(effect, unknowns, table)
     return effect
 
 
@@ -98,6 +93,13 @@ def _check(effect: OperatorEffect, declared: tuple[Unknown, ...], table: TomlTab
                 f'{{ unit = "{one.unit}", from = 1, to = 100 }}',
             )
     linear = tuple(one.name for one in effect.linear)
+    for name in effect.states:
+        if effect.acts_on == "actuator" and name.startswith("nest("):
+            raise table.wrong(
+                f"an actuator does not know which nest is read: {name}",
+                "expression",
+                remedy='Write acts_on = "point", or leave it out',
+            )
     for expression in effect.expressions:
         if expression.text.strip() not in ("0", "0.0") and not vanishes_without(expression, linear):
             raise table.wrong(
@@ -115,6 +117,13 @@ def _identifier(table: TomlTable) -> str:
             f"id is {value!r}", "id", remedy="Write small letters, digits and hyphens: my-effect"
         )
     return value
+
+
+def _frame(table: TomlTable, acts_on: str) -> str:
+    frame = table.choice("frame", FRAMES, "tracker")
+    if acts_on != "point" and table.has("frame"):
+        raise table.wrong("an actuator has no frame", "frame", remedy="Leave frame out")
+    return frame
 
 
 def _axes(table: TomlTable, acts_on: str) -> tuple[str, ...]:
@@ -137,31 +146,33 @@ def _expressions(table: TomlTable, acts_on: str) -> tuple[Expression, ...]:
     return tuple(parse_expression(one, table.place("expression")) for one in given)
 
 
-def _unknowns(table: TomlTable) -> tuple[Unknown, ...]:
+def _unknowns(table: TomlTable) -> tuple[tuple[Unknown, ...], frozenset[str]]:
+    """The unknowns, and which of them are one for all actuators."""
     unknowns = table.named("unknowns", required=False)
     if not unknowns.names():
         raise table.wrong("no unknowns are declared", "unknowns", remedy='Write { k = "1/mm" }')
-    return tuple(_unknown(unknowns, name) for name in unknowns)
+    found = [_unknown(unknowns, name) for name in unknowns]
+    return tuple(one for one, _ in found), frozenset(one.name for one, common in found if common)
 
 
-def _unknown(unknowns: TomlTable, name: str) -> Unknown:
-    taken = {*OWN, *POINT, *FUNCTIONS, *CONSTANTS, "t"}
-    if not re.fullmatch(r"[A-Za-z_]\w*", name) or name in taken or NUMBERED.fullmatch(name):
+def _unknown(unknowns: TomlTable, name: str) -> tuple[Unknown, bool]:
+    taken = {*OWN, *POINT, *POSE, *FUNCTIONS, *SEVERAL, *LABELS, *CONSTANTS, "t"}
+    if not re.fullmatch(r"[A-Za-z_]\w*", name) or name in taken or OF_ONE.fullmatch(name):
         raise unknowns.wrong(f"an unknown cannot be called {name!r}", name, remedy="Rename it")
     value = unknowns.raw(name, "text or table")
     if isinstance(value, str):
-        return Unknown(name, value, steps=TRIALS)
+        return Unknown(name, value, steps=TRIALS), False
     if not isinstance(value, dict):
         raise unknowns.wrong(f"{name} is {value!r}", name, remedy=f'Write {name} = "its unit"')
     about = unknowns.table(name)
-    about.only("unit", "size", "sigma", "from", "to", "steps")
+    about.only("unit", "size", "sigma", "from", "to", "steps", "shared")
     size = about.optional_number("size", above=0.0)
     low, high = about.optional_number("from"), about.optional_number("to")
     if (low is None) != (high is None) or (low is not None and high is not None and low >= high):
         raise about.wrong(
             f"{name}: from and to are no range", "from", remedy="Give both, from < to"
         )
-    return Unknown(
+    one = Unknown(
         name,
         about.text("unit", "1"),
         math.nan if size is None else size,
@@ -169,3 +180,4 @@ def _unknown(unknowns: TomlTable, name: str) -> Unknown:
         bounds=None if low is None or high is None else (low, high),
         steps=about.whole("steps", TRIALS, least=2, most=400),
     )
+    return one, about.flag("shared", False)

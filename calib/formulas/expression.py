@@ -1,64 +1,24 @@
-"""Formulas that an operator writes: parsed by our own grammar, never run as Python.
+"""Formulas that an operator writes: parsed by our own grammar (``parser.py``), never run as Python.
 
-    sum     = product (("+" | "-") product)*
-    product = power (("*" | "/") power)*
-    power   = ("+" | "-") power | atom ["**" power]
-    atom    = number | name | name "(" sum ("," sum)* ")" | "(" sum ")"
-
-There are numbers, names, the usual functions and nothing else: no attributes, no indices, no
-strings. Derivatives are exact, by forward-mode differentiation: every node answers its value and
-its derivative by each unknown it contains.
+There are numbers, names, the usual functions and comparisons and nothing else: no attributes.
+Derivatives are exact, by forward-mode differentiation: every node answers its value and its
+derivative by each unknown it contains. What jumps (comparisons, ``step``, ``sign``) has none.
 """
 
-import math
-import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from calib.arrays import Array
-from calib.errors import BadInput
-
-LONGEST = 2000
-DEEPEST = 60
-CONSTANTS = {"pi": math.pi, "e": math.e}
+from calib.arrays import Array, BoolArray
+from calib.formulas.functions import CONSTANTS, FUNCTIONS
+from calib.formulas.parser import Node, parse
 
 _Pair = tuple[Array, dict[str, Array]]
 """A value and its derivatives by the unknowns in it."""
 
-_TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
-    r"|(?P<name>[A-Za-z_][A-Za-z_0-9]*)|(?P<sign>\*\*|[-+*/(),]))"
-)
-
-FUNCTIONS: dict[str, tuple[Callable[[Array], Array], Callable[[Array], Array]]] = {
-    "sin": (np.sin, np.cos),
-    "cos": (np.cos, lambda x: -np.sin(x)),
-    "tan": (np.tan, lambda x: 1.0 / np.cos(x) ** 2),
-    "asin": (np.arcsin, lambda x: 1.0 / np.sqrt(1.0 - x**2)),
-    "acos": (np.arccos, lambda x: -1.0 / np.sqrt(1.0 - x**2)),
-    "atan": (np.arctan, lambda x: 1.0 / (1.0 + x**2)),
-    "sinh": (np.sinh, np.cosh),
-    "cosh": (np.cosh, np.sinh),
-    "tanh": (np.tanh, lambda x: 1.0 - np.tanh(x) ** 2),
-    "exp": (np.exp, np.exp),
-    "log": (np.log, lambda x: 1.0 / x),
-    "sqrt": (np.sqrt, lambda x: 0.5 / np.sqrt(x)),
-    "abs": (np.abs, np.sign),
-    "sign": (np.sign, np.zeros_like),
-}
-"""Each function of one argument with its derivative."""
-
-
-@dataclass(frozen=True)
-class Node:
-    """A part of a formula: ``what`` is number, name, function or an operator; ``at`` its column."""
-
-    what: str
-    at: int
-    text: str = ""
-    parts: tuple["Node", ...] = ()
+JUMPING = ("step", "sign")
+"""Functions in which an unknown has no derivative that a fit could follow."""
 
 
 @dataclass(frozen=True)
@@ -89,96 +49,6 @@ class Expression:
             return _evaluate(self.root, values, unknowns)
 
 
-class _Parser:
-    def __init__(self, text: str, place: str) -> None:
-        self.text, self.place, self.depth = text, place, 0
-        self.tokens: list[tuple[str, str, int]] = []
-        at = 0
-        while text[at:].strip():
-            found = _TOKEN.match(text, at)
-            if not found:
-                column = at + len(text[at:]) - len(text[at:].lstrip()) + 1
-                raise self.error(column, f'"{text[column - 1]}" has no meaning here')
-            kind = found.lastgroup or ""
-            self.tokens.append((kind, found[kind], found.start(kind) + 1))
-            at = found.end()
-        self.tokens.append(("end", "", len(text) + 1))
-        self.next = 0
-
-    def error(self, column: int, what: str) -> BadInput:
-        return BadInput(
-            f"{what} (column {column} of the expression {self.text!r})",
-            place=self.place,
-            remedy="Expected numbers, names, + - * / **, brackets and the functions "
-            + ", ".join(FUNCTIONS),
-        )
-
-    def take(self, *texts: str) -> tuple[str, int] | None:
-        kind, text, column = self.tokens[self.next]
-        if kind == "sign" and text in texts:
-            self.next += 1
-            return text, column
-        return None
-
-    def must(self, text: str, why: str) -> None:
-        if not self.take(text):
-            _, found, column = self.tokens[self.next]
-            raise self.error(column, f'"{found}" where {why}' if found else f"it ends where {why}")
-
-    def sum(self) -> Node:
-        self.depth += 1
-        if self.depth > DEEPEST:
-            raise self.error(self.tokens[self.next][2], "brackets are nested too deeply")
-        node = self.product()
-        while sign := self.take("+", "-"):
-            node = Node(sign[0], sign[1], parts=(node, self.product()))
-        self.depth -= 1
-        return node
-
-    def product(self) -> Node:
-        node = self.power()
-        while sign := self.take("*", "/"):
-            node = Node(sign[0], sign[1], parts=(node, self.power()))
-        return node
-
-    def power(self) -> Node:
-        negative, start = False, None
-        while sign := self.take("+", "-"):
-            start = start or sign[1]
-            negative ^= sign[0] == "-"
-        node = self.atom()
-        if sign := self.take("**"):
-            self.depth += 1
-            if self.depth > DEEPEST:
-                raise self.error(sign[1], "powers are nested too deeply")
-            node = Node("**", sign[1], parts=(node, self.power()))
-            self.depth -= 1
-        return Node("neg", start or node.at, parts=(node,)) if negative else node
-
-    def atom(self) -> Node:
-        kind, text, column = self.tokens[self.next]
-        if self.take("("):
-            node = self.sum()
-            self.must(")", f'the bracket of column {column} should close with ")"')
-            return node
-        if kind == "number":
-            self.next += 1
-            return Node("number", column, text)
-        if kind != "name":
-            found = f'"{text}"' if text else "the end"
-            raise self.error(column, f"{found} where a number or a name should be")
-        self.next += 1
-        if not self.take("("):
-            if text in FUNCTIONS:
-                raise self.error(column, f"the function {text} needs its argument in brackets")
-            return Node("name", column, text)
-        if text not in FUNCTIONS:
-            raise self.error(column, f'there is no function "{text}"')
-        argument = self.sum()
-        self.must(")", f'{text}(...) should close with ")": it takes one argument')
-        return Node("function", column, text, (argument,))
-
-
 def parse_expression(text: str, place: str) -> Expression:
     """Parse a formula.
 
@@ -187,18 +57,7 @@ def parse_expression(text: str, place: str) -> Expression:
     BadInput
         Naming ``place`` and the column of the fault.
     """
-    if not text.strip() or len(text) > LONGEST:
-        raise BadInput(
-            "the expression is empty" if not text.strip() else "the expression is too long",
-            place=place,
-            remedy=f'Write a formula such as "k * s**2", of at most {LONGEST} characters',
-        )
-    parser = _Parser(text, place)
-    root = parser.sum()
-    kind, found, column = parser.tokens[parser.next]
-    if kind != "end":
-        raise parser.error(column, f'"{found}" where an operator should be')
-    return Expression(text, root)
+    return Expression(text, parse(text, place))
 
 
 def _evaluate(node: Node, values: Mapping[str, Array], unknowns: frozenset[str]) -> _Pair:
@@ -211,6 +70,12 @@ def _evaluate(node: Node, values: Mapping[str, Array], unknowns: frozenset[str])
         return np.asarray(values[node.text], dtype=np.float64), slope
     pairs = [_evaluate(part, values, unknowns) for part in node.parts]
     value, slopes = pairs[0]
+    if node.what == "compare":
+        return np.asarray(_COMPARED[node.text](value, pairs[1][0]), dtype=np.float64), {}
+    if node.text == "where":
+        return _chosen(value != 0.0, pairs[1], pairs[2])
+    if node.text in ("max", "min"):
+        return _extreme(node.text, pairs)
     if node.what == "neg":
         return -value, _scaled(slopes, np.asarray(-1.0))
     if node.what == "function":
@@ -218,6 +83,34 @@ def _evaluate(node: Node, values: Mapping[str, Array], unknowns: frozenset[str])
         answer = np.asarray(function(value))
         return answer, _scaled(slopes, np.asarray(derivative(value))) if slopes else {}
     return _OPERATIONS[node.what](value, slopes, *pairs[1])
+
+
+def _chosen(first: BoolArray, one: _Pair, other: _Pair) -> _Pair:
+    """One where ``first`` is true, else the other."""
+    none = np.asarray(0.0)
+    slopes = {
+        name: np.where(first, one[1].get(name, none), other[1].get(name, none))
+        for name in {**one[1], **other[1]}
+    }
+    return np.where(first, one[0], other[0]), slopes
+
+
+def _extreme(which: str, pairs: Sequence[_Pair]) -> _Pair:
+    """The largest or the smallest."""
+    best = pairs[0]
+    for pair in pairs[1:]:
+        best = _chosen(best[0] >= pair[0] if which == "max" else best[0] <= pair[0], best, pair)
+    return best
+
+
+_COMPARED: dict[str, Callable[[Array, Array], Array]] = {
+    "<": np.less,
+    "<=": np.less_equal,
+    ">": np.greater,
+    ">=": np.greater_equal,
+    "==": np.equal,
+    "!=": np.not_equal,
+}
 
 
 def _scaled(slopes: dict[str, Array], factor: Array) -> dict[str, Array]:
@@ -287,13 +180,31 @@ def _interplay(node: Node, unknowns: frozenset[str]) -> _Interplay:
     inside = frozenset[str]().union(*(part[0] for part in parts))
     curved = frozenset[str]().union(*(part[1] for part in parts))
     pairs = frozenset[frozenset[str]]().union(*(part[2] for part in parts))
-    if node.what in ("function", "**"):
+    if node.text == "where":
+        condition = parts[0][0]
+        free = (parts[1][0] | parts[2][0]) - condition
+        pairs |= {frozenset((a, b)) for a in condition for b in free}
+        return inside, curved | condition, pairs
+    if node.what in ("function", "**", "compare"):
         return inside, inside, pairs
     if node.what in ("*", "/"):
         one, other = parts[0][0], parts[1][0]
         curved |= (one & other) | (other if node.what == "/" else frozenset())
         pairs |= {frozenset((a, b)) for a in one for b in other if a != b}
     return inside, curved, pairs
+
+
+def jumping_unknowns(expression: Expression, unknowns: Sequence[str]) -> frozenset[str]:
+    """Unknowns in a comparison, a ``step`` or a ``sign``: no derivative moves them."""
+    found: set[str] = set()
+    waiting = [(expression.root, False)]
+    while waiting:
+        node, inside = waiting.pop()
+        if inside and node.what == "name" and node.text in unknowns:
+            found.add(node.text)
+        jumps = node.what == "compare" or (node.what == "function" and node.text in JUMPING)
+        waiting += [(part, inside or jumps) for part in node.parts]
+    return frozenset(found)
 
 
 def vanishes_without(expression: Expression, linear: tuple[str, ...]) -> bool:
@@ -307,7 +218,9 @@ def _has_factor(node: Node, linear: frozenset[str]) -> bool:
     if node.what == "number":
         return float(node.text) == 0.0
     inside = [_has_factor(part, linear) for part in node.parts]
-    if node.what in ("+", "-"):
+    if node.text == "where":
+        return all(inside[1:])
+    if node.what in ("+", "-") or node.text in ("max", "min"):
         return all(inside)
     if node.what == "*":
         return any(inside)
