@@ -41,11 +41,11 @@ class LegCompliance(Effect):
 
     def unavailable(self, rows: Rows) -> str:
         """Without a weight, or where none of it rests on an actuator."""
-        return weightless(rows) or ("" if _loaded(rows).size else "no actuator carries the weight")
+        return weightless(rows) or ("" if loaded(rows).size else "no actuator carries the weight")
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``leg-compliance.leg1`` ..., mm/N or rad/(N mm)."""
-        axes = [rows.machine.axes[index] for index in _loaded(rows)]
+        axes = [rows.machine.axes[index] for index in loaded(rows)]
         return tuple(
             Unknown(f"leg-compliance.{axis.name}", axis.compliance_unit, axis.compliance)
             for axis in axes
@@ -53,21 +53,21 @@ class LegCompliance(Effect):
 
     def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
         """Each actuator alone."""
-        return alone(_loaded(rows).size)
+        return alone(loaded(rows).size)
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """What the weight puts into each actuator."""
         shape = per_actuator(actuator_forces(situation))
-        return Signature(extension=shape[_loaded(situation.rows)])
+        return Signature(extension=shape[loaded(situation.rows)])
 
 
-def _loaded(rows: Rows) -> IntArray:
+def loaded(rows: Rows) -> IntArray:
     """Actuators on which the weight of any run can rest, by index."""
-    loaded = np.zeros(len(rows.machine.actuators), dtype=bool)
+    borne = np.zeros(len(rows.machine.actuators), dtype=bool)
     for run in rows.runs:
         if run.header.load is not None:
-            loaded |= _carrying(rows.machine, tuple(map(float, run.header.load.gravity)))
-    return np.flatnonzero(loaded)
+            borne |= _carrying(rows.machine, tuple(map(float, run.header.load.gravity)))
+    return np.flatnonzero(borne)
 
 
 @lru_cache(maxsize=64)

@@ -44,7 +44,7 @@ class Site:
     @property
     def rotary(self) -> bool:
         """Whether its actuators turn."""
-        return self.stroke != MILLIMETRES
+        return self.stroke.per_mm != MILLIMETRES.per_mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +67,8 @@ class Physics:
         elements only.
     compliance
         (N, n), mm/N or rad/(N mm), of each actuator under the load that it carries.
+    friction
+        (N, n), mm/N or rad/(N mm), with its sign: of each actuator, per size of the load.
     nest
         Displacement (N, 3) of a nest in the frame that carries it, at times (N,) s; ``down``
         (N, 3) is the direction of gravity there.
@@ -79,6 +81,7 @@ class Physics:
 
     extension: Callable[[Circumstances], Array] | None = None
     compliance: Callable[[Circumstances], Array] | None = None
+    friction: Callable[[Circumstances], Array] | None = None
     nest: Callable[[Nest, Array, Array], Array] | None = None
     base: Callable[[Array, Array], Array] | None = None
     seen: Callable[[Array, Array, float | None], Array] | None = None

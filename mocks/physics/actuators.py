@@ -83,15 +83,17 @@ class ActuatorErrors:
     @property
     def yields(self) -> bool:
         """Whether actuators give way under load."""
-        return any(physics.compliance is not None for physics, _ in self._hidden)
+        return any(p.compliance is not None or p.friction is not None for p, _ in self._hidden)
 
-    def compliance(self, c: Circumstances) -> Array:
-        """How much each gives way, (N, n), mm/N or rad/(N mm)."""
-        total = np.zeros(c.extension.shape)
+    def softness(self, c: Circumstances) -> tuple[Array, Array]:
+        """How each gives way to its load, and to the load's size, (N, n), mm/N or rad/(N mm)."""
+        yields, lags = np.zeros(c.extension.shape), np.zeros(c.extension.shape)
         for physics, _ in self._hidden:
             if physics.compliance is not None:
-                total = total + physics.compliance(c)
-        return total
+                yields = yields + physics.compliance(c)
+            if physics.friction is not None:
+                lags = lags + physics.friction(c)
+        return yields, lags
 
     def _after_move(self, c: Circumstances) -> Array:
         since, unit = np.maximum(c.delay, 0.0), self._stroke.per_mm

@@ -19,7 +19,8 @@ class Stroke:
 
     ``per_mm``: what moves the machine as 1 mm of a leg does; ``cycle``: period of the cyclic
     error where none is given; ``speed``: per s; ``counts``: the drive's counts in a unit;
-    ``digits``: decimals of q in a file; ``smallest``: change that reverses an actuator.
+    ``digits``: decimals of q in a file; ``smallest``: change that reverses an actuator;
+    ``ends``: how far it may go from home.
     """
 
     per_mm: float = 1.0
@@ -28,10 +29,12 @@ class Stroke:
     counts: float = 1e6
     digits: int = 6
     smallest: float = 1e-4
+    ends: tuple[float, float] = (-35.715, 34.285)
 
 
 MILLIMETRES = Stroke()
-RADIANS = Stroke(1.0 / 317.0, 2.0 * np.pi, 0.2, 1e9, 9, 1e-6)
+SLIDE = Stroke(ends=(-130.0, 20.0))
+RADIANS = Stroke(1.0 / 317.0, 2.0 * np.pi, 0.2, 1e9, 9, 1e-6, (np.radians(-55.0), np.radians(50.0)))
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ class LegErrors:
         self._load = load
         self._actuators = ActuatorErrors(hidden, LIMBS, MILLIMETRES, settles)
         self._growth = hidden.get("thermal-growth.a")
+        self._own_growth = hidden.limbs("leg-warming.*", LIMBS)
         self._bending = hidden.get("unknown.bending.k")
         self._twist_lead = hidden.get("screw-twist.L")
 
@@ -39,7 +40,8 @@ class LegErrors:
 
     def _warmth(self, c: Circumstances) -> Array:
         length = HOME_LENGTH_MM + c.extension
-        growth = self._growth * (c.structure - REFERENCE_C)[:, None] * length
+        each = self._growth + self._own_growth / HOME_LENGTH_MM
+        growth = each * (c.structure - REFERENCE_C)[:, None] * length
         sun = 1.0 + np.cos(np.radians(PHI_B_DEG))
         gradient = (c.structure - c.air)[:, None]
         return np.asarray(growth + self._bending * gradient * sun * (length / HOME_LENGTH_MM) ** 2)
@@ -58,7 +60,8 @@ class LegErrors:
             error += self._twist_lead / (2.0 * np.pi) * change
         if self._actuators.yields:
             force = axial_forces(legs, pose, self._load, c.payload)
-            error += self._actuators.compliance(c) * force
+            yields, lags = self._actuators.softness(c)
+            error += yields * force + lags * np.abs(force)
         return error
 
 

@@ -42,6 +42,7 @@ class RealPtm:
     ) -> None:
         self._geometry = geometry(parameters)
         self._actuators = ActuatorErrors(hidden, LIMBS, RADIANS, settles)
+        self._own_growth = hidden.limbs("leg-warming.*", LIMBS)
         self._growth = hidden.get("thermal-growth.a")
         self._load = load
         self._stiffness = EQUAL.copy()
@@ -58,24 +59,27 @@ class RealPtm:
 
     def poses(self, c: Circumstances, start: Pose) -> Pose:
         """Poses at N instants; they start from the closed form of a machine without errors."""
-        angles = c.extension + self._actuators.added(c)
-        grown = 1.0 + self._growth * (c.structure - REFERENCE_C)
+        warmth = c.structure - REFERENCE_C
+        angles = c.extension + self._actuators.added(c) + warmth[:, None] * self._own_growth
+        grown = 1.0 + self._growth * warmth
         # Many instants share a state: the same pose read at several nests is closed once.
         states, which = np.unique(
-            np.column_stack([angles, self._actuators.compliance(c), grown, c.payload]),
+            np.column_stack([angles, *self._actuators.softness(c), grown, c.payload]),
             axis=0,
             return_inverse=True,
         )
-        pose = self._closed(states[:, :2], states[:, 2:4], states[:, 4], states[:, 5])
+        pose = self._closed(states[:, :2], states[:, 2:6], states[:, 6], states[:, 7])
         return Pose(pose.position[which], pose.rotation[which])
 
-    def _closed(self, angles: Array, compliance: Array, grown: Array, payload: Array) -> Pose:
+    def _closed(self, angles: Array, softness: Array, grown: Array, payload: Array) -> Pose:
+        yields, lags = softness[:, :2], softness[:, 2:]
+
         def motors(pose: Pose, by_motor: Array) -> Array:
             if not self._actuators.yields:
                 return angles
             wrench = self._load.wrench(pose.rotation, payload)
             torque = np.einsum("nij,ni->nj", by_motor, wrench)
-            return np.asarray(angles + compliance * torque)
+            return np.asarray(angles + yields * torque + lags * np.abs(torque))
 
         return close(self._geometry, motors, grown, self._stiffness, stance(angles)).pose
 

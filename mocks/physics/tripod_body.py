@@ -7,7 +7,7 @@ import numpy as np
 from mocks.hidden.table import Hidden
 from mocks.physics.actuators import ActuatorErrors, Load
 from mocks.physics.body import Place, Surroundings
-from mocks.physics.circumstances import MILLIMETRES, REFERENCE_C, Circumstances
+from mocks.physics.circumstances import REFERENCE_C, SLIDE, Circumstances
 from mocks.physics.parallelograms import settle, sides
 from mocks.physics.pose import Array, Pose
 from mocks.physics.tripod import HOME_Q, LIMBS, geometry, positions, slider_places
@@ -45,7 +45,8 @@ class RealTripod:
         self, parameters: Mapping[str, float], hidden: Hidden, load: Load, settles: bool
     ) -> None:
         self._geometry = geometry(parameters)
-        self._actuators = ActuatorErrors(hidden, LIMBS, MILLIMETRES, settles)
+        self._actuators = ActuatorErrors(hidden, LIMBS, SLIDE, settles)
+        self._own_growth = hidden.limbs("leg-warming.*", LIMBS)
         self._growth = hidden.get("thermal-growth.a")
         self._compliance = hidden.get("gravity-sag.c")
         self._difference = hidden.limbs("parallelogram-sides.*", LIMBS)
@@ -60,8 +61,9 @@ class RealTripod:
     def poses(self, c: Circumstances, start: Pose) -> Pose:
         """Poses at N instants; ``start`` is not needed, the closed form has one root below."""
         g = self._geometry
-        places = c.extension + g.l0 + self._actuators.added(c)
-        h = g.h * (1.0 + self._growth * (c.structure - REFERENCE_C)[:, None])
+        warmth = (c.structure - REFERENCE_C)[:, None]
+        places = c.extension + g.l0 + self._actuators.added(c) + self._own_growth * warmth
+        h = g.h * (1.0 + self._growth * warmth)
         count = len(places)
         parallel = Pose(positions(g, places, h), np.tile(np.eye(3), (count, 1, 1)))
         if not (self._compliance or self._difference.any() or self._azimuth.any()):
@@ -79,7 +81,7 @@ class TripodBody:
     def __init__(self) -> None:
         self.machine = machine_file("tripod")
         self.limbs = LIMBS
-        self.stroke = MILLIMETRES
+        self.stroke = SLIDE
         self.around = AROUND
 
     def reference(self, held: Mapping[str, float]) -> Array:

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 from made_run import machine_of, rows_of
 
-from calib.effects import Effect, is_shipped
+from calib.effects import Effect, Situation, is_shipped
 from calib.identify import fit
 from calib.identify.fitting import Fit
 from calib.identify.signatures import columns_at
 from calib.model import Model
-from calib.model.columns import at_trial
+from calib.model.columns import at_trial, whitened_columns
 from calib.model.prediction import State
 from calib.runs import parse_run
 from calib.runs.stack import stack
@@ -211,9 +211,27 @@ def wrong_columns(effect: Effect, name: str) -> Iterator[str]:
         slope = np.einsum("ijn,jn->in", rows.whitener, (ahead - back) / (2.0 * size))
         off, largest = np.abs(own - slope).max(), np.abs(slope).max()
         if largest == 0.0:
+            if _moves_at_another(effect, linear.situation, unknowns, index, trials):
+                continue
             yield f"{name}: {unknown.name} moves no reading"
         elif off > 3e-3 * largest:
             yield f"{name}: the column of {unknown.name} is off by {off / largest:.2g} of itself"
+
+
+def _moves_at_another(
+    effect: Effect,
+    situation: Situation,
+    unknowns: Sequence[Unknown],
+    index: int,
+    trials: Sequence[tuple[float, ...]],
+) -> bool:
+    """Whether an unknown moves a reading at another place, period or moment that is searched."""
+    return any(
+        whitened_columns(effect.signature(situation, at_trial(unknowns, trial)), situation)[
+            index
+        ].any()
+        for trial in trials
+    )
 
 
 def complaints(

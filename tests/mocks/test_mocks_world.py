@@ -117,7 +117,7 @@ def test_backlash_shortens_after_moving_out_and_lengthens_after_moving_in() -> N
 
 def test_screw_pitch_and_quadratic() -> None:
     assert extra({"screw-pitch.leg2": 1e-3}, UP)[1] == pytest.approx(4.5e-3, abs=1e-7)
-    both = extra({"unknown.screw-quadratic.leg5": 1e-4}, UP)
+    both = extra({"lead-variation.leg5": 1e-4}, UP)
     assert both[4] == pytest.approx(1e-4 * 4.5**2, abs=1e-7)
 
 

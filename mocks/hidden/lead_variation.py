@@ -1,4 +1,4 @@
-"""A screw whose pitch changes along its length: not in the catalogue."""
+"""A screw that is cut worse at its ends, an encoder whose divisions widen: the lead changes."""
 
 import numpy as np
 
@@ -7,10 +7,10 @@ from mocks.hidden.table import Hidden
 from mocks.physics.circumstances import Stroke
 
 
-class ScrewQuadratic(HiddenEffect):
-    """An extension that grows with the square."""
+class LeadVariation(HiddenEffect):
+    """The lead itself is off by 2 k s: it adds up to the square."""
 
-    id = "unknown.screw-quadratic"
+    id = "lead-variation"
     numbers = LIMB
     says = "1/mm (1/rad): extension = k s^2"
     trial = 1e-5
@@ -21,13 +21,15 @@ class ScrewQuadratic(HiddenEffect):
         return of_limbs(self.id, site, rng)
 
     def example(self, site: Site) -> Table:
-        """One actuator."""
-        return {f"unknown.screw-quadratic.{site.limbs[0]}": 1e-5 / site.stroke.per_mm}
+        """Two actuators."""
+        first, *_, last = site.limbs
+        size = 1e-5 / site.stroke.per_mm
+        return {f"lead-variation.{first}": size, f"lead-variation.{last}": -2.0 * size}
 
     def physics(self, hidden: Hidden, limbs: tuple[str, ...], stroke: Stroke) -> Physics:
         """In proportion to the square of the extension."""
-        k = hidden.limbs("unknown.screw-quadratic.*", limbs)
+        k = hidden.limbs("lead-variation.*", limbs)
         return Physics(extension=lambda c: k * c.extension**2)
 
 
-EFFECTS = (ScrewQuadratic(),)
+EFFECTS = (LeadVariation(),)
