@@ -86,6 +86,22 @@ class UnexplainedEntry(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
+class LikenessEntry(Record):
+    """Which known effects the unknown is like, and how much: 1 is all of it, 0 nothing."""
+
+    effects: tuple[str, ...]
+    value: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class HintEntry(Record):
+    """An effect that may be there besides: chance looks like this in some runs of a hundred."""
+
+    effect: str
+    p_value: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class NoiseComponentEntry(Record):
     """A component of the noise: ``correlated`` (its time constant, s), ``visit`` or ``scale``.
 
@@ -125,6 +141,8 @@ class DiagnosisReport(Report):
     candidates: tuple[CandidateEntry, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
     unexplained: UnexplainedEntry
+    likeness: LikenessEntry | None = None
+    hints: tuple[HintEntry, ...] = ()
     noise: NoiseEntry
     bad_readings: tuple[BadReadingEntry, ...]
     unavailable: Mapping[str, str]
@@ -177,6 +195,8 @@ class DiscoveryReport(Report):
     record: tuple[RemarkEntry, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
     unexplained: UnexplainedEntry
+    likeness: LikenessEntry | None = None
+    hints: tuple[HintEntry, ...] = ()
     noise: NoiseEntry
     bad_readings: tuple[BadReadingEntry, ...]
     unavailable: Mapping[str, str]

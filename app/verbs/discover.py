@@ -90,6 +90,9 @@ def words(report: dict[str, Any]) -> str:
     lines += [
         f"This run cannot tell apart: {', '.join(group)}" for group in report["indistinguishable"]
     ]
+    lines += [
+        f"Perhaps besides: {hint['effect']} (p = {hint['p_value']:.1g})" for hint in report["hints"]
+    ]
     if report["unexplained"]["significant"]:
         channels = ", ".join(report["unexplained"]["channels"])
         lines.append(f"Structure is left that no known effect explains; it depends on: {channels}")

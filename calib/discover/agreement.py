@@ -7,9 +7,11 @@ explained and all together are not, the runs are of two machines, or of one that
 import math
 from dataclasses import dataclass
 
+import numpy as np
 from scipy import special
 
 from calib.errors import BadInput
+from calib.evidence.repeats import pure_error
 from calib.identify.fitting import Fit
 from calib.identify.staged import fit_effects
 from calib.runs.stack import stack
@@ -18,6 +20,8 @@ BY_CHANCE = 1e-6
 """Probability of what is called no chance."""
 TOGETHER_WORSE = 1.5
 """Chi-square per degree of freedom together, over that apart, from which runs are at odds."""
+LOOSE = 1e-3
+"""p-value below which base nests are not read as well as they should be."""
 TOO_SMALL, TOO_LARGE = 1.3, 0.7
 """Scatter in stated uncertainties beyond which these are called untrue."""
 
@@ -64,6 +68,23 @@ def runs_at_odds(fitted: Fit) -> AtOdds | None:
         return None
     total = sum(one.readings * one.rms_mm**2 for one in apart)
     return AtOdds(math.sqrt(total / readings), fitted.rms_mm)
+
+
+def loose_references(fitted: Fit) -> str:
+    """Say if base nests scatter from reading to reading more than sx, sy, sz say; else empty."""
+    rows = fitted.model.rows
+    references = np.flatnonzero(fitted.accepted & ~rows.on_platform)
+    found = pure_error(
+        fitted.linear.whitened[:, references],
+        [(int(rows.run[row]), rows.nest_name[row]) for row in references],
+        fitted.dof,
+    )
+    if not found.dof or not found.p_value < LOOSE or not found.variance > 1.0:
+        return ""
+    return (
+        f"But base nests scatter {math.sqrt(found.variance):.2g} times as much from reading to "
+        f"reading as sx, sy, sz say (p = {found.p_value:.1g}): look for a loose one"
+    )
 
 
 def untrue_uncertainties(fitted: Fit) -> str:

@@ -6,14 +6,20 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from calib.discover.agreement import TOGETHER_WORSE, runs_at_odds, untrue_uncertainties
+from calib.discover.agreement import (
+    TOGETHER_WORSE,
+    loose_references,
+    runs_at_odds,
+    untrue_uncertainties,
+)
 from calib.discover.carrier import carriers, motion_words
 from calib.discover.diagnosis import RunDiagnosis
 from calib.discover.discovery import stage_of
+from calib.discover.likeness import likeness_of, likeness_of_found, likeness_words
 from calib.discover.noise_report import noise_report, noise_words
 from calib.effects import not_defined
 from calib.evidence.findings import Diagnosis, Finding
-from calib.evidence.forward import Discovery
+from calib.evidence.forward import WEAK, Discovery, hints
 from calib.identify.fitting import Fit
 from calib.identify.report import bad_readings, quality, um
 from calib.identify.starting import MOVED
@@ -22,8 +28,6 @@ from calib.runs.remark import Remark, plain_remarks
 from calib.unknown import Estimate, estimates_of, linear_among
 
 FEW_POSES = 15
-WEAK = 1e-3
-"""p-value above which what is called for may well be chance: one in twenty runs shows such."""
 
 
 def diagnosis_report(found: RunDiagnosis) -> dict[str, Any]:
@@ -36,11 +40,12 @@ def diagnosis_report(found: RunDiagnosis) -> dict[str, Any]:
             "effects": [effect.id for effect in found.fit.model.effects],
             **_quality(found),
         },
-        "adequate": diagnosis.adequate and settled(record),
+        **_verdict(found, record),
         "record": plain_remarks(record),
         "candidates": [_candidate(found, finding) for finding in diagnosis.findings],
         "indistinguishable": [list(group) for group in diagnosis.indistinguishable],
         "unexplained": _unexplained(diagnosis),
+        "likeness": likeness_of(diagnosis) if diagnosis.best is None else None,
         "noise": noise_report(found),
         "bad_readings": bad_readings(found.fit),
         "unavailable": found.unavailable,
@@ -65,16 +70,34 @@ def discovery_report(discovery: Discovery) -> dict[str, Any]:
             for number, step in enumerate(discovery.steps)
         ],
         "effects": list(discovery.last.effects),
-        "adequate": last.diagnosis.adequate and settled(record),
+        **_verdict(last, record),
         "record": plain_remarks(record),
         "indistinguishable": [list(group) for group in _groups(discovery)],
         "unexplained": _unexplained(last.diagnosis),
+        "likeness": likeness_of_found(discovery),
         "noise": noise_report(last),
         "bad_readings": bad_readings(last.fit),
         "parameters": effect_parameters(last.fit),
         "refused": list(discovery.refused),
         "unavailable": last.unavailable,
-        "advice": advice(last, record, discovery.refused),
+        "advice": advice(last, record, discovery.refused, likeness_of_found(discovery)),
+    }
+
+
+def _hinted(found: RunDiagnosis) -> tuple[str, ...]:
+    return hints(found.diagnosis, [effect.id for effect in found.fit.model.effects])
+
+
+def _verdict(found: RunDiagnosis, record: Sequence[Remark]) -> dict[str, Any]:
+    """Whether the model will do: nothing is called for but hints, and the record is sound."""
+    named = _hinted(found)
+    return {
+        "adequate": (found.diagnosis.adequate or bool(named)) and settled(record),
+        "hints": [
+            {"effect": one.name, "p_value": one.p_value}
+            for one in found.diagnosis.findings
+            if one.name in named
+        ],
     }
 
 
@@ -179,7 +202,12 @@ def _unexplained(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def advice(found: RunDiagnosis, record: Sequence[Remark] = (), refused: Sequence[str] = ()) -> str:
+def advice(
+    found: RunDiagnosis,
+    record: Sequence[Remark] = (),
+    refused: Sequence[str] = (),
+    likeness: dict[str, Any] | None = None,
+) -> str:
     """One sentence for the operator: what to do next; ``refused`` by the held-out poses.
 
     What is wrong with the record comes before all physics.
@@ -187,10 +215,15 @@ def advice(found: RunDiagnosis, record: Sequence[Remark] = (), refused: Sequence
     first = [one for one in record if not one.settled]
     if first and not runs_at_odds(found.fit):
         return f"{first[0].says}. {first[0].remedy}; then ask again."
-    return _of_physics(found, refused)
+    alike = likeness or (likeness_of(found.diagnosis) if found.diagnosis.best is None else None)
+    return _of_physics(found, refused, alike)
 
 
-def _of_physics(found: RunDiagnosis, refused: Sequence[str]) -> str:
+def _of_physics(
+    found: RunDiagnosis,
+    refused: Sequence[str],
+    likeness: dict[str, Any] | None,
+) -> str:
     diagnosis = found.diagnosis
     bad = len(found.fit.bad)
     excluded = f" {_readings(bad)} excluded: see bad_readings." if bad else ""
@@ -204,6 +237,12 @@ def _of_physics(found: RunDiagnosis, refused: Sequence[str]) -> str:
     told = noise_words(found)
     if told:
         excluded = f" As to noise: {told}.{excluded}"
+    if hinted := _hinted(found):
+        return (
+            f"Nothing else is clearly missing. {' and '.join(hinted)} might be there too, but one "
+            f"run in twenty looks so by chance: pkmcal design --discriminate {hinted[0]} nothing "
+            f"plans the readings that decide.{excluded}"
+        )
     if diagnosis.adequate:
         if scatter:
             return (
@@ -212,6 +251,8 @@ def _of_physics(found: RunDiagnosis, refused: Sequence[str]) -> str:
         if told:
             excluded = excluded.removeprefix(" As to noise:")
             return f"Nothing else is missing:{excluded}"
+        if loose := loose_references(found.fit):
+            return f"Nothing is missing that these readings show. {loose}.{excluded}"
         return f"Nothing is missing: the model explains the readings to their noise.{excluded}"
     best = diagnosis.best
     odds = runs_at_odds(found.fit)
@@ -224,7 +265,7 @@ def _of_physics(found: RunDiagnosis, refused: Sequence[str]) -> str:
         so_far = f"{named}: named, but not the whole story. " if named else ""
         return (
             f"{so_far}Something is missing that no known effect explains; "
-            f"{_depends(diagnosis)}.{excluded}"
+            f"{_depends(diagnosis)}.{likeness_words(likeness, _depends(diagnosis))}{excluded}"
         )
     if best.name in refused:
         return (

@@ -18,6 +18,8 @@ MOST_STEPS = 8
 SLACK = 1e-6
 """Relative rise of the hold-out error that counts as none (rounding of a refit)."""
 
+WEAK = 1e-3
+"""p-value above which one effect *more* is but a hint: one run in twenty shows such by chance."""
 BY_CHANCE = 0.02
 """Relative change of the hold-out error by an unknown that is of no use, either way."""
 
@@ -92,7 +94,8 @@ def discover(
     groups: list[tuple[str, ...]] = []
     while len(steps) <= MOST_STEPS:
         now = steps[-1].stage
-        added = _next(now, refused)
+        discovered = len(steps) > 1 + len(first)
+        added = _next(now, refused, WEAK if discovered else ALPHA)
         if added is None:
             break
         tried = refit((*now.effects, added))
@@ -116,8 +119,8 @@ def speaks_against(before: float, after: float) -> bool:
     return math.isinf(after) or after > before * (1.0 + SLACK)
 
 
-def _next(stage: Stage, refused: Sequence[str]) -> str | None:
-    """Name the best effect that is called for and has not been refused.
+def _next(stage: Stage, refused: Sequence[str], limit: float) -> str | None:
+    """Name the best effect whose p-value is below ``limit`` and that has not been refused.
 
     First those that explain the residual one after the other: the second may be significant only
     beside the first.
@@ -126,8 +129,24 @@ def _next(stage: Stage, refused: Sequence[str]) -> str | None:
     if diagnosis.unknown_preferred or not diagnosis.explained_by:
         return None
     called_for = [f.name for f in diagnosis.findings if significant(f.log_p, ALPHA)]
+    clear = {f.name for f in diagnosis.findings if significant(f.log_p, limit)}
+    # What is significant only beside another is not asked to be clear without it.
+    if limit == ALPHA or diagnosis.explained_by[0] in clear:
+        clear |= set(diagnosis.explained_by)
     offered = (*diagnosis.explained_by, *called_for)
-    return next((name for name in offered if name not in refused), None)
+    return next((name for name in offered if name in clear and name not in refused), None)
+
+
+def hints(diagnosis: Diagnosis, effects: Sequence[str]) -> tuple[str, ...]:
+    """Effects that a model with ``effects`` might have besides, called for too weakly to be added.
+
+    Where nothing is in the model yet there are none: the first question is one question.
+    """
+    called = diagnosis.explained_by
+    if not effects or diagnosis.unknown_preferred or diagnosis.unexplained.significant:
+        return ()
+    weak = {f.name for f in diagnosis.findings if not significant(f.log_p, WEAK)}
+    return called if all(name in weak for name in called) else ()
 
 
 def _superfluous(

@@ -59,10 +59,10 @@ FIELDS = {
     "proposed",
     "CompletionReport": "machine tried parameters rank_before rank_after lacking proposal",
     "CorrectReport": "machine model actuators effects left_out remarks channels poses",
-    "DiagnosisReport": "baseline adequate record candidates indistinguishable unexplained noise "
-    "bad_readings unavailable not_on_this_machine advice",
-    "DiscoveryReport": "steps effects adequate record indistinguishable unexplained noise "
-    "bad_readings unavailable parameters refused advice",
+    "DiagnosisReport": "baseline adequate record candidates indistinguishable unexplained likeness "
+    "hints noise bad_readings unavailable not_on_this_machine advice",
+    "DiscoveryReport": "steps effects adequate record indistinguishable unexplained likeness hints "
+    "noise bad_readings unavailable parameters refused advice",
     "FitReport": "effects readings chi2_per_dof rms_um noise_floor_um holdout_rms_um "
     "holdout_floor_um parameters unidentified unidentified_words bad_readings left_out_readings "
     "channels_left_aside settled steps remarks record",
