@@ -64,11 +64,30 @@ class ParameterEntry(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
+class KindEntry(Record):
+    """How well the readings of one kind are explained; ``unit`` is um or urad.
+
+    ``rms`` and ``floor`` (what a perfect model would show) are per component, over those that are
+    not a hundred times vaguer than the best; ``ratio`` is over all, each by its own sigma: 1 is
+    perfect.
+    """
+
+    kind: str
+    readings: int
+    components: int
+    unit: str
+    rms: float | None
+    floor: float | None
+    ratio: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
 class FitReport(Report):
     """What a fit found (``pkm-fit/1``).
 
     Errors are RMS of the 3D distance between measured and predicted SMR centre in micrometres;
-    a ``floor`` is what a perfect model would show; ``holdout`` is over poses that were not fitted.
+    a ``floor`` is what a perfect model would show; ``holdout`` is over poses that were not fitted,
+    ``platform`` over the same readings as they were fitted. ``by_kind`` has each kind of reading.
     Where it is not ``settled`` the answer is the best point that its ``steps`` came to.
     """
 
@@ -80,6 +99,9 @@ class FitReport(Report):
     noise_floor_um: float | None
     holdout_rms_um: float | None
     holdout_floor_um: float | None
+    platform_rms_um: float | None
+    platform_floor_um: float | None
+    by_kind: tuple[KindEntry, ...]
     parameters: tuple[ParameterEntry, ...]
     unidentified: tuple[tuple[str, ...], ...]
     unidentified_words: tuple[str, ...]

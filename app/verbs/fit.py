@@ -54,13 +54,8 @@ def words(report: dict[str, Any]) -> str:
         *record_lines(report),
         f"{report['readings']} readings, effects: {', '.join(report['effects']) or 'none'}",
         "",
-        answer.table(
-            ("", "RMS", "perfect model"),
-            [
-                ("fitted readings", _um(report["rms_um"]), _um(report["noise_floor_um"])),
-                ("held-out poses", _um(report["holdout_rms_um"]), _um(report["holdout_floor_um"])),
-            ],
-        ),
+        answer.table(("", "RMS", "perfect model"), _qualities(report)),
+        *_kinds(report),
         f"chi-square per degree of freedom {report['chi2_per_dof']:.3f} (1 is perfect)",
         "",
         answer.table(
@@ -82,6 +77,41 @@ def words(report: dict[str, Any]) -> str:
     for name, why in report["channels_left_aside"].items():
         lines += ["", f"Column {name} is not a channel: {why}"]
     return "\n".join(lines)
+
+
+def _qualities(report: dict[str, Any]) -> list[tuple[str, ...]]:
+    """All fitted readings; where some are on the base, those of the poses that are held out."""
+    rows = [
+        ("fitted readings", "rms_um", "noise_floor_um"),
+        ("of these at poses", "platform_rms_um", "platform_floor_um"),
+        ("held-out poses", "holdout_rms_um", "holdout_floor_um"),
+    ]
+    if report["platform_rms_um"] == report["rms_um"]:
+        del rows[1]
+    return [(name, _um(report[rms]), _um(report[floor])) for name, rms, floor in rows]
+
+
+def _kinds(report: dict[str, Any]) -> list[str]:
+    """One line for each kind of reading, where there are others than points."""
+    kinds = report["by_kind"]
+    if [one["kind"] for one in kinds] in ([], ["point"]):
+        return []
+
+    def said(value: float | None, unit: str) -> str:
+        return "-" if value is None else f"{value:.2f} {unit}"
+
+    rows = [
+        (
+            one["kind"],
+            str(one["readings"]),
+            said(one["rms"], one["unit"]),
+            said(one["floor"], one["unit"]),
+            said(one["ratio"], ""),
+        )
+        for one in kinds
+    ]
+    heads = ("kind", "readings", "RMS a component", "perfect model", "over perfect")
+    return ["", answer.table(heads, rows), ""]
 
 
 def _um(value: float | None) -> str:

@@ -87,13 +87,13 @@ def _of_reading(fit: Fit) -> list[Variable]:
     rows, situation, kept = fit.model.rows, fit.linear.situation, fit.accepted
     count = fit.readings
     x, y, z = situation.point[:, kept]
-    points = Response("point", accepted(fit, np.swapaxes(rows.whitener, 0, 1)))
+    points = Response("point", accepted(fit, np.swapaxes(situation.whitener, 0, 1)))
     turned = np.moveaxis(situation.frame_rotation, 1, 0)
     platform = [
         rotate(situation.rotation, axis[:, None] * np.ones(rows.count)) for axis in np.eye(3)
     ]
     in_tracker = [np.einsum("jin,jn->in", turned, one) for one in platform]
-    seats = np.stack([np.einsum("ijn,jn->in", rows.whitener, one) for one in in_tracker])
+    seats = np.stack([np.einsum("ijn,jn->in", situation.whitener, one) for one in in_tracker])
     seats = seats * rows.on_platform
     labels = {name: number for number, name in enumerate(dict.fromkeys(rows.nest_name))}
     nest = np.array([labels[name] for name in rows.nest_name], dtype=np.float64)[kept]
@@ -125,14 +125,14 @@ def _repeats(fit: Fit, which: BoolArray) -> PureError:
     rows = fit.model.rows
     states: list[object] = []
     for row in np.flatnonzero(fit.accepted):
-        state = (int(rows.run[row]), rows.pose_name[row], rows.nest_name[row])
+        state = (int(rows.run[row]), rows.pose_name[row], rows.nest_name[row], rows.sort(int(row)))
         states.append((state, rows.direction[:, row].tobytes()) if which[row] else None)
     if not which[fit.accepted].any():
         return PureError(0, float("nan"), float("nan"), 0.0)
     if not fit.model.rows.on_platform[np.flatnonzero(which)[0]]:
         states = [state[0] if isinstance(state, tuple) else None for state in states]
     whitened = fit.linear.whitened[:, fit.accepted]
-    return pure_error(whitened, states, fit.dof)
+    return pure_error(whitened, states, fit.dof, rows.components[fit.accepted])
 
 
 def _displacement(fit: Fit, speaking: Speaking) -> float:
@@ -148,7 +148,7 @@ def pose_residuals(fit: Fit) -> PoseResidual:
     poses = _gathered(fit)
     columns = situation.actuator_columns
     n = columns.shape[0]
-    base = np.einsum("jin,jn->in", situation.frame_rotation, fit.linear.residual)
+    base = np.einsum("jin,jn->in", situation.frame_rotation, _displaced(fit))
     extension = np.full((n, len(poses)), np.nan)
     shift = np.zeros((3, len(poses)))
     for number, members in enumerate(poses):
@@ -165,6 +165,19 @@ def pose_residuals(fit: Fit) -> PoseResidual:
         extension=extension,
         q=rows.q[:, first],
     )
+
+
+def _displaced(fit: Fit) -> Array:
+    """Smallest displacement (3, N) of each point that explains its residual, frame axes, mm."""
+    slope, residual = fit.linear.situation.slope, fit.linear.residual
+    if slope is None:
+        return residual
+    rows = fit.model.rows
+    seen = np.moveaxis(slope * rows.live[:, None], -1, 0)
+    own = residual * rows.live
+    if rows.sensed is not None:
+        own *= ~rows.sensed.turn
+    return np.asarray(np.einsum("nij,jn->in", np.linalg.pinv(seen), own))
 
 
 def _gathered(fit: Fit) -> Sequence[list[int]]:

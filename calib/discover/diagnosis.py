@@ -79,10 +79,11 @@ class RunDiagnosis:
         spread = np.sqrt(np.diag(covariance))
         left = linear.whitened - np.tensordot(step, jacobian, axes=1)
         natural = rows.in_mm(left[:, accepted], accepted)
+        told = rows.in_millimetres[:, accepted].any(axis=0)
         held = hold_out_of(fitted, linear.whitened, jacobian, precision, pull, accepted)
         values = np.where(linear_among(one.unknowns), step[-sigma.size :], values)
         return Outlook(
-            rms_mm=float(np.sqrt(np.mean(np.sum(natural**2, axis=0)))),
+            rms_mm=float(np.sqrt(np.sum(natural**2) / max(told.sum(), 1))),
             holdout=held,
             estimates=estimates_of(one.unknowns, values, spread[-sigma.size :]),
         )

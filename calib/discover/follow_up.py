@@ -12,6 +12,7 @@ import numpy as np
 
 from calib.arrays import Array, IntArray
 from calib.effects.component import Effect
+from calib.errors import BadInput
 from calib.identify.fitting import Fit
 from calib.model.columns import whitened_columns
 from calib.model.prediction import Model
@@ -51,7 +52,14 @@ def hypothetical_rows(fit: Fit, poses: PoseSet, channels: Mapping[str, float]) -
     q[:, :platform] = np.repeat(poses.q, len(nests), axis=1)
     q[:, platform:] = old.machine.home_q[:, None]
     places = [*list(nests.values()) * count, *list(base.values()) * BASE_READS]
-    typical = fit.accepted & old.on_platform
+    typical = fit.accepted & old.on_platform & old.placed & old.optical
+    if not typical.any():
+        raise BadInput(
+            "no reading of this run is a point on the platform in the frame of a tracker",
+            place=old.runs[-1].source,
+            remedy="Follow-up poses are chosen for a tracker's points; choose poses for other "
+            "instruments with pkmcal poses",
+        )
     covariance = old.covariance[:, :, typical].mean(axis=2)
     progress = np.linspace(0.0, 1.0, total)
     duration = max(float(np.ptp(old.time_s)), 1.0)

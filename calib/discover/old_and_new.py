@@ -98,7 +98,7 @@ class OldAndNew:
             else:
                 kept[linear] = follow.columns(effect, values, rows)
             parts.append(kept)
-        parts.append(np.zeros((6 * model.frames, *shape)))
+        parts.append(np.zeros((len(model.setup.unknowns) + 6 * model.frames, *shape)))
         return np.concatenate([*parts, *apart, follow.frame])
 
 

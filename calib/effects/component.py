@@ -51,6 +51,10 @@ class Situation:
     closed, state_of, parameters : Configuration of M, (N,), (P,) or (P, M)
         The machine closed at its M distinct states, the state of each reading, and the parameters
         with which it was closed; ``closing`` is the machine that was closed (see Effect.closure).
+    slope, turner : (3, 3, N), optional
+        Derivative of each reading's components by the point, in mm or rad per mm; whitened
+        derivative by a rotation of the platform about the axes of the reading's frame. None where
+        all readings are points.
     """
 
     rows: Rows
@@ -64,6 +68,15 @@ class Situation:
     state_of: IntArray
     parameters: Array
     closing: Machine
+    slope: Array | None = None
+    turner: Array | None = None
+
+    @cached_property
+    def whitener(self) -> Array:
+        """Whitened derivative (3, 3, N) of the readings by the point, in the tracker frame."""
+        if self.slope is None:
+            return self.rows.whitener
+        return np.asarray(np.einsum("ijn,jkn->ikn", self.rows.whitener, self.slope))
 
     @property
     def machine(self) -> Machine:
@@ -88,13 +101,17 @@ class Situation:
     @cached_property
     def whitened_frame(self) -> Array:
         """Whitener times frame rotation, (3, 3, N)."""
-        return whitened_frame(self.rows.whitener, self.frame_rotation)
+        return whitened_frame(self.whitener, self.frame_rotation)
 
     @cached_property
     def lever(self) -> Array:
         """Matrix (3, 6, N) from the platform's twist to the whitened reading."""
         arm = self.base_point - self.position
-        return lever_of(self.whitened_frame, arm, self.rows.on_platform)
+        lever = lever_of(self.whitened_frame, arm, self.rows.on_platform)
+        if self.turner is not None:
+            turned = whitened_frame(self.turner, self.frame_rotation)
+            lever[:, 3:] += turned * self.rows.on_platform
+        return lever
 
     @cached_property
     def actuator_columns(self) -> Array:

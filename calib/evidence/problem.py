@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg
 
-from calib.arrays import Array
+from calib.arrays import Array, BoolArray
 from calib.scaled import Scaled, normal_matrix
 
 VANISHING = 1e-10
@@ -40,11 +40,14 @@ class LinearProblem:
         Derivatives of the prediction by the fitted unknowns, in sigmas per unit.
     prior_precision : (p,)
         1 / sigma^2 of the priors; zero for unknowns without one (frames).
+    live : (R,) bool, optional
+        Components that are held, if not all; the others are zero throughout.
     """
 
     residual: Array
     jacobian: Array
     prior_precision: Array
+    live: BoolArray | None = None
 
     def __post_init__(self) -> None:
         p, rows = self.jacobian.shape
@@ -56,8 +59,8 @@ class LinearProblem:
 
     @property
     def rows(self) -> int:
-        """Number R of whitened components."""
-        return self.residual.size
+        """Number of whitened components that are held."""
+        return self.residual.size if self.live is None else int(self.live.sum())
 
     @cached_property
     def _normal(self) -> Scaled:
@@ -111,7 +114,9 @@ class LinearProblem:
         By perturbation: e = eps - J^T N^-1 (J eps + Lambda^1/2 xi), whose covariance is
         I - 2 J^T N^-1 J + J^T N^-1 N N^-1 J = M.
         """
-        noise = rng.standard_normal((self.rows, draws))
+        noise = rng.standard_normal((self.residual.size, draws))
+        if self.live is not None:
+            noise *= self.live[:, None]
         prior = np.sqrt(self.prior_precision)[:, None] * rng.standard_normal(
             (self.prior_precision.size, draws)
         )
@@ -130,4 +135,5 @@ class LinearProblem:
             residual=self.residual - projected.T @ beta,
             jacobian=np.concatenate([self.jacobian, columns]),
             prior_precision=np.concatenate([self.prior_precision, precision]),
+            live=self.live,
         )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from calib.arrays import Array
+from calib.arrays import Array, IntArray
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,9 @@ class PureError:
     excess: float
 
 
-def pure_error(residual: Array, states: Sequence[object], dof: float) -> PureError:
+def pure_error(
+    residual: Array, states: Sequence[object], dof: float, components: IntArray | None = None
+) -> PureError:
     """Compare repeats of the same state (pose, nest, direction of approach ...).
 
     Parameters
@@ -43,6 +45,8 @@ def pure_error(residual: Array, states: Sequence[object], dof: float) -> PureErr
         Readings with the same label are repeats; None belongs to no state.
     dof : float
         Degrees of freedom of the whole fit (components minus tr H).
+    components : (N,), optional
+        How many components each reading holds, if not all c; repeats hold the same.
     """
     groups: dict[object, list[int]] = {}
     for index, state in enumerate(states):
@@ -53,7 +57,8 @@ def pure_error(residual: Array, states: Sequence[object], dof: float) -> PureErr
         if len(members) > 1:
             here = residual[:, members]
             squares += float(np.sum((here - here.mean(axis=1, keepdims=True)) ** 2))
-            freedom += residual.shape[0] * (len(members) - 1)
+            held = residual.shape[0] if components is None else int(components[members].min())
+            freedom += held * (len(members) - 1)
     if freedom == 0:
         return PureError(0, float("nan"), float("nan"), 0.0)
     misfit = max(float(np.sum(residual**2)) - dof, 0.0)

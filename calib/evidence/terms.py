@@ -111,10 +111,11 @@ def _half(
     """The problem and the library on some of the components."""
     jacobian = problem.jacobian[:, half]
     slope = jacobian @ problem.residual[half] - problem.jacobian @ problem.residual
-    empty = LinearProblem(problem.residual[half], jacobian, problem.prior_precision)
+    live = None if problem.live is None else problem.live[half]
+    empty = LinearProblem(problem.residual[half], jacobian, problem.prior_precision, live)
     residual = problem.residual[half] - empty.absorbed.T @ empty.whitened_step(slope)
     own = [replace(one, columns=np.ascontiguousarray(one.columns[:, :, half])) for one in library]
-    return LinearProblem(residual, jacobian, problem.prior_precision), own
+    return LinearProblem(residual, jacobian, problem.prior_precision, live), own
 
 
 def _forward(

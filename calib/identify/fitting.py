@@ -82,7 +82,8 @@ class Fit:
         columns = self.linear.situation.actuator_columns * rows.on_platform
         visit = np.where(rows.on_platform, rows.path.stop[rows.at], -1)
         motions = (usual[:, None, None] * columns)[:, :, kept]
-        return Taking(rows.run[kept], rows.time_s[kept], visit[kept], motions)
+        live = None if rows.sensed is None else rows.live[:, kept]
+        return Taking(rows.run[kept], rows.time_s[kept], visit[kept], motions, live)
 
     @cached_property
     def prior_precision(self) -> Array:
@@ -92,14 +93,17 @@ class Fit:
     @property
     def problem(self) -> LinearProblem:
         """The fit as a linear problem over its accepted readings."""
-        return LinearProblem(self.whitened, self.jacobian, self.prior_precision)
+        rows = self.model.rows
+        live = None if rows.sensed is None else rows.live[:, self.accepted].reshape(-1)
+        return LinearProblem(self.whitened, self.jacobian, self.prior_precision, live)
 
     @cached_property
     def values(self) -> Array:
         """Unknowns (p,) in the order of ``model.names``; frames as x, y, z, rx, ry, rz."""
         state = self.linear.state
         frames = [frame_values(state, run) for run in range(self.model.frames)]
-        return np.concatenate([state.parameters[self.model.free], *state.effects, *frames])
+        own = (state.parameters[self.model.free], *state.effects, state.setup)
+        return np.concatenate([*own, *frames])
 
     @cached_property
     def covariance(self) -> Array:
@@ -133,9 +137,14 @@ class Fit:
         return float(np.sum(1.0 - np.diag(self.covariance) * self.prior_precision))
 
     @property
+    def components(self) -> int:
+        """Number of components that the accepted readings hold."""
+        return int(self.model.rows.components[self.accepted].sum())
+
+    @property
     def dof(self) -> float:
-        """3 readings - tr H."""
-        return 3.0 * self.readings - self.trace_hat
+        """Components (3 for each point) - tr H."""
+        return self.components - self.trace_hat
 
     @property
     def chi2_per_dof(self) -> float:
@@ -144,16 +153,30 @@ class Fit:
 
     @cached_property
     def rms_mm(self) -> float:
-        """RMS of the 3D distance between measured and predicted SMR centre."""
-        residual = self.linear.residual[:, self.accepted]
-        return float(np.sqrt(np.mean(np.sum(residual**2, axis=0))))
+        """RMS of the 3D distance between measured and predicted SMR centre.
+
+        Over readings that say something in mm, of what they say: one component of a height. Nan
+        where there are none.
+        """
+        return self.rms_of(self.accepted)
+
+    def rms_of(self, which: BoolArray) -> float:
+        """The same of some readings (N,)."""
+        told = self.model.rows.in_millimetres
+        which = which & told.any(axis=0)
+        residual = (self.linear.residual * told)[:, which]
+        return _root_mean(float(np.sum(residual**2)), int(which.sum()))
 
     @cached_property
     def noise_floor_mm(self) -> float:
         """What ``rms_mm`` would be for a perfect model: sqrt(mean tr(Sigma - J C J^T))."""
-        total = noise_variance(self, self.accepted)
-        total -= self.explained(self.step_covariance, self.accepted)
-        return float(np.sqrt(max(total, 0.0) / self.readings))
+        return self.floor_of(self.accepted)
+
+    def floor_of(self, which: BoolArray) -> float:
+        """The same of some fitted readings (N,)."""
+        which = which & self.model.rows.in_millimetres.any(axis=0)
+        total = noise_variance(self, which) - self.explained(self.step_covariance, which)
+        return _root_mean(max(total, 0.0), int(which.sum()))
 
     def explained(self, covariance: Array, which: BoolArray) -> float:
         """Sum of tr(J C J^T) in mm^2 over readings: variance of the prediction itself."""
@@ -165,7 +188,8 @@ class Fit:
 def noise_variance(fit: Fit, which: BoolArray) -> float:
     """Sum over readings of the variance of their noise, whatever they share of it, mm^2."""
     rows, noise = fit.model.rows, fit.noise
-    total = noise.scale**2 * float(np.einsum("iin->", rows.covariance[:, :, which]))
+    variances = np.where(rows.in_millimetres, np.einsum("iin->in", rows.covariance), 0.0)
+    total = noise.scale**2 * float(np.sum(variances[:, which]))
     if noise.visit > 0.0:
         usual = noise.visit * np.array([axis.usual_error for axis in rows.machine.axes])
         moved = rows.in_mm(
@@ -173,6 +197,10 @@ def noise_variance(fit: Fit, which: BoolArray) -> float:
         )
         total += float(np.sum((usual[:, None, None] * moved) ** 2))
     return total
+
+
+def _root_mean(squares: float, count: int) -> float:
+    return float(np.sqrt(squares / count)) if count else float("nan")
 
 
 def with_noise(fit: Fit, noise: Noise) -> Fit:
@@ -234,17 +262,25 @@ def fit(
     for _ in range(3):
         optimum = optimise(model, linear, accepted)
         linear, steps = optimum.linear, steps + optimum.steps
-        found = strays(linear.whitened, linear.jacobian, 1.0 / model.prior**2, accepted)
+        found = strays(
+            linear.whitened, linear.jacobian, 1.0 / model.prior**2, accepted, model.rows.components
+        )
         if not found:
             break
         for row in found:
-            miss = float(np.linalg.norm(linear.residual[:, row]))
-            bad.append(
-                bad_reading(model, row, f"stray: {1000 * miss:.3g} um from where it should be")
-            )
+            bad.append(bad_reading(model, row, f"stray: {miss_in_words(linear, row)}"))
             accepted[row] = False
     covariance, settled = optimum.covariance, optimum.settled
     return Fit(model, linear, accepted, tuple(bad), covariance, steps, tuple(gross), settled)
+
+
+def miss_in_words(linear: Linearised, row: int) -> str:
+    """How far a reading is from what it should be."""
+    rows = linear.situation.rows
+    miss = float(np.linalg.norm(linear.residual[:, row]))
+    if rows.sensed is not None and rows.sensed.angular[row]:
+        return f"{1e6 * miss:.3g} urad from what it should read"
+    return f"{1000 * miss:.3g} um from where it should be"
 
 
 def _with_frames(start: State, begun: State) -> State:

@@ -62,16 +62,17 @@ def hold_out_of(
     teach = learn(fit, whitened, jacobian, precision, pull, accepted)
     for fold in np.unique(rows.fold[rows.fold >= 0]):
         held = (rows.fold == fold) & accepted
-        if not held.any() or held.sum() == accepted.sum():
+        told = held & rows.in_millimetres.any(axis=0)
+        if not told.any() or held.sum() == accepted.sum():
             continue
         own = jacobian[:, :, held]
         inverse, slope = teach(held)
         off = whitened[:, held] - np.tensordot(inverse @ slope, own, axes=1)
         squares += float(np.sum(rows.in_mm(off, held) ** 2))
-        floor += noise_variance(fit, held)
+        floor += noise_variance(fit, told)
         natural = rows.in_mm(own, held).reshape(own.shape[0], -1)
         floor += float(np.sum(natural * (inverse @ natural)))
-        count += int(held.sum())
+        count += int(told.sum())
     if count == 0:
         return HoldOut(float("nan"), float("nan"), 0)
     return HoldOut(float(np.sqrt(squares / count)), float(np.sqrt(floor / count)), count)

@@ -80,7 +80,7 @@ def optimise(
             if damping > 1e8:
                 return Optimum(linear, normal.inverse(), taken, False)
         damping = _damped(damping, (cost - reached) / fall, bent=taken + 1 >= STRAIGHT)
-        worth = cost / (3.0 * accepted.sum())
+        worth = cost / model.rows.components[accepted].sum()
         stalled = stalled + 1 if abs(cost - reached) < STALLED * worth else 0
         linear, cost = trial, reached
     normal, _ = readings.normal_equations(linear)

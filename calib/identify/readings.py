@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from calib.arrays import Array, BoolArray
+from calib.arrays import Array, BoolArray, IntArray
 from calib.runs.stack import Rows
 from calib.scaled import Scaled, normal_matrix
 
@@ -60,7 +60,11 @@ def _mm(distance: float) -> str:
 
 
 def strays(
-    whitened: Array, jacobian: Array, prior_precision: Array, candidates: BoolArray
+    whitened: Array,
+    jacobian: Array,
+    prior_precision: Array,
+    candidates: BoolArray,
+    components: IntArray | None = None,
 ) -> list[int]:
     """Find strays among accepted readings, worst first, each judged without those before it.
 
@@ -74,14 +78,18 @@ def strays(
         1 / sigma^2 of the priors.
     candidates : (N,) bool
         Readings in the fit.
+    components : (N,), optional
+        How many components each reading holds, if not three.
     """
     accepted = candidates.copy()
+    if components is None:
+        components = np.full(accepted.size, 3, dtype=np.intp)
     flat = np.where(accepted, jacobian, 0.0)
     normal = normal_matrix(flat.reshape(flat.shape[0], -1), prior_precision)
     step = np.zeros(flat.shape[0])
     found: list[int] = []
     while len(found) < MOST_STRAYS * candidates.sum():
-        index, moved = _worst(whitened, jacobian, normal, step, accepted)
+        index, moved = _worst(whitened, jacobian, normal, step, accepted, components)
         if index is None:
             break
         found.append(index)
@@ -93,7 +101,12 @@ def strays(
 
 
 def _worst(
-    whitened: Array, jacobian: Array, normal: Array, step: Array, accepted: BoolArray
+    whitened: Array,
+    jacobian: Array,
+    normal: Array,
+    step: Array,
+    accepted: BoolArray,
+    components: IntArray,
 ) -> tuple[int | None, Array]:
     """Most suspicious reading, or None; and the step of the fit once it is left out."""
     inverse = Scaled.of(normal).inverse()
@@ -105,11 +118,25 @@ def _worst(
     freed = np.linalg.solve(np.eye(3) - hat, residual[:, :, None])[:, :, 0]
     drop = np.where(accepted, np.sum(residual * freed, axis=1), 0.0)
     total = float(np.sum(residual[accepted] ** 2)) + 0.0
-    dof = 3.0 * accepted.sum() - float(np.einsum("nii->n", hat)[accepted].sum())
-    worst = int(np.argmax(drop))
-    others = max((total - drop[worst]) / max(dof - 3.0, 1.0), 1.0)
-    ratio = drop[worst] / 3.0 / others
-    chance = count * float(special.fdtrc(3, max(dof - 3.0, 1.0), ratio))
+    dof = float(components[accepted].sum()) - float(np.einsum("nii->n", hat)[accepted].sum())
+    # A height is compared with its one component, a point with its three.
+    own = np.maximum(components, 1)
+    worst = int(np.argmin(_log_chance(drop, own, max(total, 1.0), dof)))
+    size = int(own[worst])
+    others = max((total - drop[worst]) / max(dof - size, 1.0), 1.0)
+    ratio = drop[worst] / size / others
+    chance = count * float(special.fdtrc(size, max(dof - size, 1.0), ratio))
     if chance > FALSE_ALARM:
         return None, step
     return worst, step - spread[:, :, worst] @ freed[worst]
+
+
+def _log_chance(drop: Array, own: IntArray, total: float, dof: float) -> Array:
+    """How unlikely (N,) each drop of chi-square is, up to what all share: less is less likely.
+
+    Where all readings hold as many components the largest drop is the least likely one.
+    """
+    if np.all(own == own[0]):
+        return -drop
+    scaled = drop / max(total / max(dof, 1.0), 1.0)
+    return np.asarray(-0.5 * scaled + 0.5 * own + 0.5 * own * np.log(np.maximum(scaled / own, 1.0)))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from calib.arrays import BoolArray
+from calib.identify.by_kind import plain_kinds
 from calib.identify.fitting import Fit
 from calib.identify.holdout import hold_out
 
@@ -28,6 +29,8 @@ def fit_report(fit: Fit) -> dict[str, Any]:
         **quality(fit),
         "holdout_rms_um": um(held.rms_mm),
         "holdout_floor_um": um(held.floor_mm),
+        **of_platform(fit),
+        "by_kind": plain_kinds(fit),
         "parameters": parameter_table(fit),
         "unidentified": unidentified_groups(fit),
         "unidentified_words": unidentified_words(fit),
@@ -45,6 +48,15 @@ def quality(fit: Fit) -> dict[str, float | None]:
         "chi2_per_dof": _finite(fit.chi2_per_dof),
         "rms_um": um(fit.rms_mm),
         "noise_floor_um": um(fit.noise_floor_mm),
+    }
+
+
+def of_platform(fit: Fit) -> dict[str, float | None]:
+    """RMS and floor of the fitted readings whose poses are held out in turn: like with like."""
+    which = fit.accepted & (fit.model.rows.fold >= 0)
+    return {
+        "platform_rms_um": um(fit.rms_of(which)),
+        "platform_floor_um": um(fit.floor_of(which)),
     }
 
 
@@ -67,6 +79,7 @@ def parameter_table(fit: Fit) -> list[dict[str, Any]]:
     identified = identified_mask(fit)
     units = [model.machine.parameters[index].unit for index in model.free]
     units += [unknown.unit for group in model.unknowns for unknown in group]
+    units += [unknown.unit for unknown in model.setup.unknowns]
     units += ["mm", "mm", "mm", "rad", "rad", "rad"] * model.frames
     nominal: list[float | None] = [float(v) for v in model.centre]
     nominal[len(nominal) - 6 * model.frames :] = [None] * (6 * model.frames)

@@ -80,8 +80,9 @@ def _known(latest: Fit, effects: Sequence[Effect], masked: Sequence[int]) -> Fit
 def begin_at(state: State, values: tuple[Array, ...]) -> State:
     """Start of a larger model at the geometry and frames of a smaller one's optimum."""
     return State(
-        state.parameters, values, state.frame_rotation, state.frame_position, state.configuration
-    )
+        state.parameters, values, state.frame_rotation, state.frame_position, state.configuration,
+        state.setup,
+    )  # fmt: skip
 
 
 def _searched(latest: Fit, one: EffectColumns) -> State:

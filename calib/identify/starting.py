@@ -7,7 +7,7 @@ from calib.errors import BadInput
 from calib.frames import align
 from calib.identify.alignment import collinear, misfit, moved_together, robust_align
 from calib.identify.readings import BadReading, wrong_place
-from calib.mechanism.rigid import rotate
+from calib.mechanism.rigid import from_euler, rotate
 from calib.mechanism.solve import forward
 from calib.model.prediction import Model
 from calib.model.state import Linearised, State
@@ -33,9 +33,10 @@ def begin(model: Model, allowed: BoolArray) -> tuple[Linearised, list[BadReading
     state, linear = aligned(model, base, allowed)
     slack = slack_of(model, linear)
     apart = np.sqrt(np.sum(linear.residual**2, axis=0))
-    if np.all(apart[allowed] < slack[allowed]):
+    placed = allowed & model.rows.placed
+    if np.all(apart[placed] < slack[placed]):
         return linear, []
-    state, bad = _aligned_robustly(model, base, allowed, slack)
+    state, bad = _aligned_robustly(model, base, placed, slack)
     return model.linearise(state), bad
 
 
@@ -44,16 +45,35 @@ def aligned(model: Model, base: Array, allowed: BoolArray) -> tuple[State, Linea
     rows = model.rows
     rotation, position = np.zeros((3, 3, model.frames)), np.zeros((3, model.frames))
     for run in range(model.frames):
-        here = np.flatnonzero((rows.run == run) & allowed)
+        here = np.flatnonzero((rows.frame == run) & allowed & rows.placed)
+        if collinear(base[:, here]) and (near := rows.frames[run].near) is not None:
+            rotation[:, :, run], position[:, run] = from_euler(*near[3:]), near[:3]
+            continue
         if collinear(base[:, here]):
             raise BadInput(
-                f"{here.size} readings, all on one line, cannot tie the tracker to the machine",
-                place=rows.runs[run].source,
-                remedy="Expected readings at three places at least that are not on one line",
+                f"{here.size} readings, all on one line, cannot tie {_instrument(model, run)} to "
+                "the machine",
+                place=rows.runs[rows.frames[run].run].source,
+                remedy="Expected readings at three places at least that are not on one line"
+                + _or_near(model, run),
             )
         rotation[:, :, run], position[:, run] = align(base[:, here], rows.position[:, here])
     state = model.start(rotation, position)
     return state, model.linearise(state)
+
+
+def _instrument(model: Model, frame: int) -> str:
+    return model.rows.frames[frame].instrument or "the tracker"
+
+
+def _or_near(model: Model, frame: int) -> str:
+    name = model.rows.frames[frame].instrument
+    if not name:
+        return ""
+    return (
+        f"; or say in [instruments.{name}] roughly where it stands: near = [x, y, z, rx, ry, rz], "
+        'the base in its frame; or frame = "base"'
+    )
 
 
 def _aligned_robustly(
@@ -64,14 +84,17 @@ def _aligned_robustly(
     rotation, position = np.zeros((3, 3, model.frames)), np.zeros((3, model.frames))
     bad: list[BadReading] = []
     for run in range(model.frames):
-        here = np.flatnonzero((rows.run == run) & allowed)
+        here = np.flatnonzero((rows.frame == run) & allowed)
+        if here.size < 3 and (near := rows.frames[run].near) is not None:
+            rotation[:, :, run], position[:, run] = from_euler(*near[3:]), near[:3]
+            continue
         slack[here] += disagreement(model, base, here, slack)
         R, t, inside = robust_align(base[:, here], rows.position[:, here], slack[here])
         if inside.sum() < max(6, MAJORITY * here.size) and inside.sum() < here.size:
             raise BadInput(
                 f"only {inside.sum()} of {here.size} readings are where a nest can be"
                 + _seen_from_base(model, base, here, slack),
-                place=rows.runs[run].source,
+                place=rows.runs[rows.frames[run].run].source,
                 remedy="Check the machine, the units (mm), the nests in run.toml, and whether the "
                 "column nest names the hole that the SMR was in",
             )
@@ -154,7 +177,8 @@ def slack_of(model: Model, linear: Linearised) -> Array:
     moved = model.rows.in_mm(linear.jacobian[:count])
     moved *= model.machine.prior_sigma[model.free][:, None, None]
     spread = np.sqrt(np.sum(moved**2, axis=(0, 1)))
-    noise = np.sqrt(np.einsum("iin->n", model.rows.covariance))
+    variances = np.einsum("iin->in", model.rows.covariance)
+    noise = np.sqrt(np.sum(np.where(model.rows.in_millimetres, variances, 0.0), axis=0))
     return np.asarray(1.0 + 6.0 * (np.maximum(spread, np.median(spread)) + noise))
 
 

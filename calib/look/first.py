@@ -52,6 +52,9 @@ def first_look(machine: Machine, runs: Sequence[Run]) -> Rows:
     known: _Known = {}
     for run in runs:
         check_travel(machine, run)
+        if run.sensing is not None:
+            looked.append(run)  # hypotheses about where SMRs stand need points of one tracker
+            continue
         run, of_rows = rows_alone(machine, run)
         check_lengths(machine, run)
         parts, of_places, shown = _places(machine, run)

@@ -120,7 +120,7 @@ def _step(fitted: Fit) -> _Step | None:
     others.append(np.einsum("ijn,kjn->kin", situation.whitened_frame, turned))
     rivals = [scan(fitted, one[:, :, fitted.accepted]).fall[inner].max() for one in others]
     drift = rigid_motions(situation.point) * rows.progress
-    slow = np.einsum("ijn,kjn->kin", rows.whitener, drift)[:, :, fitted.accepted]
+    slow = np.einsum("ijn,kjn->kin", situation.whitener, drift)[:, :, fitted.accepted]
     rivals.append(scan(fitted, slow).fall[0])
     if best < max(rivals) + CLEAR:
         return None

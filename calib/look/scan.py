@@ -79,7 +79,7 @@ def _summed(values: Array, *, early: bool) -> Array:
 
 def whitened(fitted: Fit, motions: Array) -> Array:
     """Motions (k, 3, N) in the base frame as whitened columns (k, 3, A)."""
-    situation, rows = fitted.linear.situation, fitted.model.rows
+    situation = fitted.linear.situation
     turned = np.stack([rotate(situation.frame_rotation, one) for one in motions])
-    whitened = np.einsum("ijn,kjn->kin", rows.whitener, turned)
+    whitened = np.einsum("ijn,kjn->kin", situation.whitener, turned)
     return np.asarray(whitened[:, :, fitted.accepted])

@@ -43,7 +43,7 @@ def whitened_columns(signature: Signature, situation: Situation) -> Array:
         turned = np.stack([rotate(situation.rotation, shape) for shape in signature.nest])
         total = total + apply_each(situation.whitened_frame * rows.on_platform, turned)
     if signature.point is not None:
-        total = total + apply_each(rows.whitener, _known(signature.point))
+        total = total + apply_each(situation.whitener * rows.optical, _known(signature.point))
     return np.asarray(total)
 
 

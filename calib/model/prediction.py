@@ -5,9 +5,10 @@ A reading of run k in a platform nest n, taken at extension s:
     p = f_effects( R_k (x + X (n + dn)) + t_k ),   (x, X) = pose( s + ds ; parameters + dp )
 
 and of a base nest b: p = f_effects(R_k b + t_k). (R_k, t_k) is the base frame in the tracker frame
-of that run; ds, dp, dn and f come from the effects. The unknowns in order: the machine's
-parameters that have a prior, the effects' unknowns, six for each frame (dt in mm, then a rotation
-vector dw in rad about the tracker's axes, R <- exp(dw) R).
+of that run; ds, dp, dn and f come from the effects. Where readings are of other kinds the
+components that are read follow from p (calib.model.observing). The unknowns in order: the machine's
+parameters that have a prior, the effects' unknowns, the setup's (calib.model.setup), six for each
+frame (dt in mm, then a rotation vector dw in rad about the tracker's axes, R <- exp(dw) R).
 """
 
 from collections.abc import Sequence
@@ -25,6 +26,8 @@ from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.rigid import cross, exponential, product, rotate
 from calib.mechanism.solve import Configuration, begun_at, forward, home_configuration
 from calib.model.columns import at_trial, change_of, channels_known, whitened_columns
+from calib.model.observing import Observed, observe
+from calib.model.setup import SetupUnknowns
 from calib.model.state import Linearised, State
 from calib.runs.stack import Rows
 from calib.unknown import Unknown, linear_among
@@ -80,30 +83,56 @@ class Model:
 
     @cached_property
     def frames(self) -> int:
-        """Number of base frames, one for each run."""
-        return len(self.rows.runs)
+        """Number of base frames, one for each run (for each instrument that has its own)."""
+        return len(self.rows.frames)
+
+    @cached_property
+    def setup(self) -> SetupUnknowns:
+        """What of the measuring setup is not exact."""
+        return SetupUnknowns(self.rows)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of all unknowns, in order."""
         parameters = tuple(self.machine.parameters[index].name for index in self.free)
-        prefix = [f"run{k + 1}.frame" if self.frames > 1 else "frame" for k in range(self.frames)]
+        prefix = self._frame_names()
         frame = tuple(f"{p}.{c}" for p in prefix for c in ("x", "y", "z", "rx", "ry", "rz"))
-        return parameters + tuple(u.name for group in self.unknowns for u in group) + frame
+        effects = tuple(u.name for group in self.unknowns for u in group)
+        return parameters + effects + tuple(u.name for u in self.setup.unknowns) + frame
+
+    def _frame_names(self) -> list[str]:
+        """``frame``; ``run2.frame`` of several runs; ``NAME.frame`` of several instruments."""
+        frames, several = self.rows.frames, len(self.rows.runs) > 1
+        per_run = [sum(one.run == other.run for other in frames) for one in frames]
+        return [
+            (f"run{one.run + 1}." if several else "")
+            + (f"{one.instrument}." if count > 1 else "")
+            + "frame"
+            for one, count in zip(frames, per_run, strict=True)
+        ]
 
     @cached_property
     def prior(self) -> Array:
         """Standard deviation of the prior of every unknown (p,); infinite for frames."""
         effects = [u.prior_sigma for group in self.unknowns for u in group]
         parameters = self.machine.prior_sigma[self.free]
-        return np.concatenate([parameters, effects, np.full(6 * self.frames, np.inf)])
+        return np.concatenate(
+            [parameters, effects, self.setup.sigma, np.full(6 * self.frames, np.inf)]
+        )
 
     @cached_property
     def centre(self) -> Array:
         """Mean of the prior of every unknown (p,); zero for effects and frames."""
         centre = np.zeros(self.prior.size)
         centre[: self.free.size] = self.machine.nominal[self.free]
+        centre[self._setup_columns] = self.setup.centre
         return centre
+
+    @property
+    def _setup_columns(self) -> slice:
+        """Where the unknowns of the setup stand among all."""
+        end = self.prior.size - 6 * self.frames
+        return slice(end - len(self.setup.unknowns), end)
 
     @cached_property
     def usable(self) -> BoolArray:
@@ -140,7 +169,10 @@ class Model:
     def start(self, rotation: Array, position: Array) -> State:
         """Nominal parameters, effects at rest, frames (3, 3, K), (3, K)."""
         nominal = self.machine.nominal.copy()
-        return State(nominal, self.effects_at_rest, rotation, position, self.nominal_configuration)
+        return State(
+            nominal, self.effects_at_rest, rotation, position, self.nominal_configuration,
+            self.setup.centre,
+        )  # fmt: skip
 
     def base_points(self) -> Array:
         """SMR centres (3, N) of the nominal machine in the base frame, mm."""
@@ -160,6 +192,8 @@ class Model:
         closed, (_, inverse) = settled.closed, self.states
         jacobians = pose_jacobians(settled.closing, closed, settled.parameters)
         base, turned, point = self._placed(state, settled)
+        seen_from, _ = _frames_of(state, rows)
+        seen = self._observed(state, settled, point, settled.signatures)
         situation = Situation(
             rows=rows,
             passive_home=home_configuration(self.machine).passive[:, 0],
@@ -167,36 +201,78 @@ class Model:
             parameter_twists=jacobians.parameters[:, :, inverse],
             base_point=base,
             point=point,
-            frame_rotation=state.frame_rotation[:, :, rows.run],
+            frame_rotation=seen_from,
             closed=closed,
             state_of=inverse,
             parameters=settled.parameters,
             closing=settled.closing,
+            slope=None if seen is None else seen.slope,
+            turner=None if seen is None else seen.turner,
         )
         now = replace(state, near=situation)
         signatures = self._signatures(now)
-        residual = rows.position - point - change_of(signatures, "point", point)
         parts = [through(situation.lever, situation.parameter_twists[self.free])]
         parts += [whitened_columns(signature, situation) for _, signature in signatures]
-        parts += self._frame_columns(turned)
-        return Linearised(now, residual, apply(rows.whitener, residual), np.concatenate(parts))
+        if self.setup.unknowns:
+            parts.append(self.setup.columns(situation, state.setup))
+        parts += self._frame_columns(turned, situation)
+        seen = self._observed(now, settled, point, signatures)
+        if seen is None:
+            residual = rows.position - point - change_of(signatures, "point", point)
+            whitened = apply(rows.whitener, residual)
+        else:
+            residual, whitened = seen.misfit(rows.position)
+        return Linearised(now, residual, whitened, np.concatenate(parts))
 
     def predict(self, state: State) -> Array:
-        """What the tracker should read (3, N), mm, without derivatives."""
+        """What the tracker should read (3, N), mm, without derivatives.
+
+        Components as they are read: see :mod:`calib.model.observing` for other kinds.
+        """
         settled = self._settled(state)
         _, _, point = self._placed(state, settled)
-        return point + change_of(settled.signatures, "point", point)
+        seen = self._observed(state, settled, point, settled.signatures)
+        if seen is None:
+            return point + change_of(settled.signatures, "point", point)
+        return seen.value
+
+    def attitudes(self, state: State) -> Array:
+        """Rotation (3, 3, N) of the platform in the frame of each reading."""
+        return self._rotations(state, self._settled(state))
+
+    def _observed(
+        self,
+        state: State,
+        settled: "_Settled",
+        point: Array,
+        signatures: list[tuple[Array, Signature]],
+    ) -> Observed | None:
+        """What is read of points (3, N) in their frames; None where points themselves are."""
+        if self.rows.sensed is None:
+            return None
+        moved = point + change_of(signatures, "point", point) * self.rows.optical
+        ends = self.setup.ends(state.setup, self._rotations(state, settled))
+        return observe(self.rows.sensed, moved, ends)
+
+    def _rotations(self, state: State, settled: "_Settled") -> Array:
+        """Attitudes (3, 3, N) of the platform in the frames."""
+        (_, inverse) = self.states
+        twist = change_of(settled.signatures, "twist", np.zeros((6, self.rows.count)))
+        own = product(exponential(twist[3:]), settled.closed.poses.rotation[:, :, inverse])
+        return product(_frames_of(state, self.rows)[0], own)
 
     def _placed(self, state: State, settled: "_Settled") -> tuple[Array, Array, Array]:
         """SMR centres (3, N): base frame; the same in the tracker's axes; tracker frame."""
         rows, poses, (_, inverse) = self.rows, settled.closed.poses, self.states
-        nest = rows.nest + change_of(settled.signatures, "nest", rows.nest)
+        nest = rows.nest if rows.sensed is None else self.setup.nests(state.setup)
+        fixed, nest = nest, nest + change_of(settled.signatures, "nest", rows.nest)
         twist = change_of(settled.signatures, "twist", np.zeros((6, rows.count)))
         arm = rotate(poses.rotation[:, :, inverse], nest)
         bent = twist[:3] + cross(twist[3:], arm)
-        base = np.where(rows.on_platform, poses.position[:, inverse] + arm + bent, rows.nest)
-        turned = rotate(state.frame_rotation[:, :, rows.run], base)
-        return base, turned, turned + state.frame_position[:, rows.run]
+        base = np.where(rows.on_platform, poses.position[:, inverse] + arm + bent, fixed)
+        rotation, position = _frames_of(state, rows)
+        turned = rotate(rotation, base)
+        return base, turned, turned + position
 
     def _settled(self, state: State) -> "_Settled":
         """Close the machine where its effects and its pose agree.
@@ -273,14 +349,16 @@ class Model:
             )
         ]
 
-    def _frame_columns(self, turned: Array) -> list[Array]:
+    def _frame_columns(self, turned: Array, situation: Situation) -> list[Array]:
         rows = self.rows
         motions = np.zeros((6, *turned.shape))
         for axis in range(3):
             motions[axis, axis] = 1.0
             motions[3 + axis] = cross(np.eye(3)[axis][:, None], turned)
-        whitened = apply_each(rows.whitener, motions)
-        return [whitened * (rows.run == run) for run in range(self.frames)]
+        whitened = apply_each(situation.whitener, motions)
+        if situation.turner is not None:
+            whitened[3:] += np.moveaxis(situation.turner, 1, 0)
+        return [whitened * (rows.frame == frame) for frame in range(self.frames)]
 
     def moved(self, state: State, step: Array) -> State:
         """Take a step (p,) of all unknowns; the configuration stays as a warm start."""
@@ -294,13 +372,15 @@ class Model:
             near = np.clip(moved, 0.5 * values, 1.5 * values)
             effects.append(np.where(scanned & (values > 0), near, moved))
             at += values.size
-        frame = step[at:].reshape(self.frames, 6).T
+        setup = state.setup + step[at : at + state.setup.size]
+        frame = step[at + state.setup.size :].reshape(self.frames, 6).T
         return replace(
             state,
             parameters=parameters,
             effects=tuple(effects),
             frame_rotation=product(exponential(frame[3:]), state.frame_rotation),
             frame_position=state.frame_position + frame[:3],
+            setup=setup,
         )
 
     def deviation(self, state: State) -> Array:
@@ -308,12 +388,22 @@ class Model:
 
         Nonlinear unknowns have been searched for: their priors hold them where they were found.
         """
-        own = np.concatenate([state.parameters[self.free], *state.effects])
+        own = np.concatenate([state.parameters[self.free], *state.effects, state.setup])
         deviation = np.zeros(self.prior.size)
         deviation[: own.size] = own - self.centre[: own.size]
         scanned = ~linear_among(unknown for group in self.unknowns for unknown in group)
-        deviation[self.free.size : own.size][scanned] = 0.0
+        deviation[self.free.size : self.free.size + scanned.size][scanned] = 0.0
         return deviation
+
+
+def _frames_of(state: State, rows: Rows) -> tuple[Array, Array]:
+    """Frame (3, 3, N), (3, N) in which each reading is: the base itself where it has none."""
+    if rows.sensed is None:
+        return state.frame_rotation[:, :, rows.run], state.frame_position[:, rows.run]
+    # The base in itself comes last, which is where BASE, -1, points to.
+    rotation = np.concatenate([state.frame_rotation, np.eye(3)[:, :, None]], axis=2)
+    position = np.concatenate([state.frame_position, np.zeros((3, 1))], axis=1)
+    return rotation[:, :, rows.frame], position[:, rows.frame]
 
 
 def _carried(start: Configuration, extension: Array, machine: Machine) -> Configuration | None:

@@ -1,6 +1,8 @@
 """Values of a model's unknowns, and the model near them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from calib.arrays import Array
 from calib.effects.component import Situation
@@ -21,6 +23,8 @@ class State:
     frame_rotation: Array
     frame_position: Array
     near: Situation | Configuration | None = None
+    setup: Array = field(default_factory=lambda: np.zeros(0))
+    """Values (S,) of what of the setup is not exact: nests, planes, zeros."""
 
     @property
     def situation(self) -> Situation | None:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.arrays import Array, IntArray
+from calib.arrays import Array, BoolArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -57,12 +57,26 @@ class Taking:
         Number of the stop at which the platform was read; -1 where something else was.
     motions : (n, 3, A)
         Whitened displacement of each reading by a usual error of each actuator.
+    live : (3, A) bool, optional
+        Components that the readings hold, if not all.
     """
 
     run: IntArray
     time_s: Array
     visit: IntArray
     motions: Array
+    live: BoolArray | None = None
+
+    @property
+    def alike(self) -> bool:
+        """Whether all readings hold the same components: only then are they alike in time."""
+        return self.live is None or bool(np.all(self.live == self.live[:, :1]))
+
+    def held(self) -> Array:
+        """Number of components (A,) of each reading."""
+        if self.live is None:
+            return np.full(self.run.size, 3.0)
+        return np.asarray(self.live.sum(axis=0), dtype=np.float64)
 
     @property
     def order(self) -> IntArray:
@@ -98,8 +112,9 @@ class Taking:
     def take(self, which: Array | IntArray) -> "Taking":
         """The same of some readings."""
         return Taking(
-            self.run[which], self.time_s[which], self.visit[which], self.motions[:, :, which]
-        )
+            self.run[which], self.time_s[which], self.visit[which], self.motions[:, :, which],
+            None if self.live is None else self.live[:, which],
+        )  # fmt: skip
 
     def variance_by_visit(self, noise: Noise) -> Array:
         """Covariance (3, 3, A) of the whitened readings by the machine's repeatability alone."""

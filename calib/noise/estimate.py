@@ -127,6 +127,8 @@ def estimate(problem: LinearProblem, taking: Taking, *, least: float = DEMANDED)
     now = white = _Sizes((), (), likelihood.of(WHITE))
     gains: dict[str, float] = {}
     left = [part for part in PARTS if part != "visit" or np.any(taking.visit >= 0)]
+    if not taking.alike:
+        left = [part for part in left if part not in TIED]
     while left:
         offers = {part: _joined(likelihood, now, part) for part in left}
         rise = {part: now.value - offer.value for part, offer in offers.items()}

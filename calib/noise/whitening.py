@@ -49,12 +49,13 @@ class Whitening:
         self._steps: list[_Step] = []
         self._chain: tuple[IntArray, Array] | None = None
         if self._plain:
-            self.log_det = 6.0 * self._count * float(np.log(noise.scale))
+            self.log_det = 2.0 * float(taking.held().sum()) * float(np.log(noise.scale))
         elif noise.visit <= 0.0 and noise.share >= 1.0:
             rho = np.exp(-taking.gaps(noise.by_row) / noise.tau_s)
             left = np.sqrt(1.0 - rho**2)
             self._chain = (taking.order, rho)
-            self.log_det = 6.0 * float(np.sum(np.log(noise.scale * left)))
+            held = taking.held()[taking.order]
+            self.log_det = 2.0 * float(held @ np.log(noise.scale * left))
         else:
             self.log_det = self._prepare(taking)
 
@@ -117,7 +118,10 @@ class Whitening:
                 taking, reading, there, fade, covariance, (1.0 - correlated) * variance, first
             )
             self._steps.append(step)
-            log_det += 2.0 * float(np.sum(np.log(spread[there])))
+            logs = np.log(spread[there])
+            if taking.live is not None:
+                logs = logs * taking.live[:, reading[there]].T
+            log_det += 2.0 * float(np.sum(logs))
         return log_det
 
 

@@ -8,9 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.errors import BadInput
+from calib.runs.sensing import Setup
+from calib.runs.setup import nests_of, setup_of
 from calib.toml_table import Asked, TomlTable
 
 FORMAT = "pkm-run/1"
+OF_KINDS = "pkm-run/2"
+"""Readings of several kinds, nests that are not exact; see docs/run-format-2.md."""
 GRAVITY = (0.0, 0.0, -9.80665)
 
 
@@ -45,6 +49,8 @@ class Header:
     controller_frame: Mapping[str, str] = field(default_factory=dict)
     """What the poses of a closed controller referred to, in its own words: pivot, system, order."""
     load: Load | None = None
+    setup: Setup | None = None
+    """What version 2 says more; None for a run of version 1."""
 
 
 def parse_header(
@@ -72,12 +78,17 @@ def parse_header(
 
 def header_of(top: TomlTable, parameters: Collection[str] | None = None) -> Header:
     """Read the tables of ``run.toml``, see :func:`parse_header`; other keys are left alone."""
-    top.format(FORMAT)
-    return contents_of(top, parameters)
+    of_kinds = top.format(FORMAT, OF_KINDS) == OF_KINDS
+    return contents_of(top, parameters, of_kinds=of_kinds)
 
 
-def contents_of(top: TomlTable, parameters: Collection[str] | None = None) -> Header:
-    """Read the same tables in a file of another format; raises BadInput with line and key."""
+def contents_of(
+    top: TomlTable, parameters: Collection[str] | None = None, *, of_kinds: bool = False
+) -> Header:
+    """Read the same tables in a file of another format; raises BadInput with line and key.
+
+    ``of_kinds``: with what version 2 says more.
+    """
     machine = top.text("machine")
     if not machine.strip():
         raise top.wrong(
@@ -100,18 +111,29 @@ def contents_of(top: TomlTable, parameters: Collection[str] | None = None) -> He
                 remedy="Give every nest a name of its own",
             )
     controller = top.table("controller", required=False)
+    if not of_kinds:
+        platform_nests, base_nests, setup = _exact(platform), _exact(base), None
+    else:
+        platform_nests, of_platform = nests_of(platform)
+        base_nests, of_base = nests_of(base)
+        setup = setup_of(top, {**of_platform, **of_base})
     return Header(
         machine=machine,
         title=top.text("title", ""),
         tracker=_tracker(top),
-        platform_nests={name: np.array(platform.numbers(name, 3, unit="mm")) for name in platform},
-        base_nests={name: np.array(base.numbers(name, 3, unit="mm")) for name in base},
+        platform_nests=platform_nests,
+        base_nests=base_nests,
         controller_serial=controller.text("serial", ""),
         controller_parameters=_controller_parameters(controller, parameters),
         compensation=controller.numbers_by_name("compensation"),
         controller_frame=texts_of(controller.named("frame", required=False)),
         load=load_of(top.table("load", required=False)) if top.has("load") else None,
+        setup=setup,
     )
+
+
+def _exact(nests: TomlTable) -> dict[str, NDArray[np.float64]]:
+    return {name: np.array(nests.numbers(name, 3, unit="mm")) for name in nests}
 
 
 def texts_of(table: TomlTable) -> dict[str, str]:

@@ -69,6 +69,10 @@ def parse_points(
 ) -> Run:
     """Read ``points.csv`` for a run whose ``run.toml`` is read already; raises BadInput."""
     table = _Table(spelled(text, source, units), source)
+    if header.setup is not None:
+        from calib.runs.kinds_table import points_of_kinds  # it reads with the helpers of this file
+
+        return points_of_kinds(table, header, header.setup, actuators)
     n_columns = table.actuator_columns(actuators, header.machine)
     table.require(("time_s", "pose", "nest", *n_columns, *POSITION, *SIGMAS))
     nest = tuple(table.cells("nest"))

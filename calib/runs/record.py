@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.runs.header import Header
+from calib.runs.sensing import Sensing
 
 Array = NDArray[np.float64]
 
@@ -42,6 +43,9 @@ class Run:
         Every other numeric column, ``delay_s`` and ``cycle`` among them; nan where empty.
     left_aside : mapping of str to str
         Columns that are no channel because they hold text, with the reason.
+    sensing : Sensing, optional
+        What each row measures, in a run of version 2: ``position`` then holds the components that
+        were read (zero where none was) and ``covariance`` theirs. None: every reading is a point.
     """
 
     header: Header
@@ -56,6 +60,7 @@ class Run:
     covariance: Array
     channels: Mapping[str, Array]
     left_aside: Mapping[str, str]
+    sensing: Sensing | None = None
 
     @property
     def readings(self) -> int:
@@ -77,6 +82,7 @@ def holdout_folds(run: Run) -> NDArray[np.int64]:
 
 
 def _label(run: Run, row: int) -> str:
-    if run.nest[row] not in run.header.platform_nests:
+    nests = run.header.platform_nests
+    if run.nest[row] not in nests or (run.sensing and run.sensing.second[row] in nests):
         return ""
     return run.pose[row] or "q " + " ".join(f"{value:.4f}" for value in run.q[:, row])

@@ -27,7 +27,7 @@ _ISO = re.compile(
 _LABELS = ("pose", "nest", "kind", "instrument", "nest2", "plane")
 _BASES = (
     (r"[xyz]|s[xyz]", "mm"), (r"s(xy|xz|yz)", "mm^2"), (r"time_s|delay_s", "s"), (r".*_C", "degC"),
-    (r".*_kg", "kg"),
+    (r".*_kg", "kg"), (r"s?(azimuth|elevation|rx|ry|rz)", "rad"),
 )  # fmt: skip
 TIME = "time"
 """Column of dates and times, in place of ``time_s``."""

@@ -12,6 +12,8 @@ from calib.mechanism.description import Machine
 from calib.runs.commanded import CommandedPath, joined_paths
 from calib.runs.record import Run, holdout_folds
 from calib.runs.remark import Remark
+from calib.runs.sensed import BASE, FrameOf, Sensed, blocks_of, sensed
+from calib.runs.sensing import POINT, POSE
 
 STATES = ("q", "extension", "direction", "step", "time_s", "progress", "run", "path")
 """State columns that every reading has; all others are channels."""
@@ -19,6 +21,8 @@ _ARRAYS = (
     "run", "line", "extension", "q", "at", "time_s", "progress", "position", "covariance", "nest",
     "on_platform", "fold",
 )  # fmt: skip
+VAGUE = 100.0
+"""Times the usual best sigma of its run from which a component tells nothing in mm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +52,9 @@ class Rows:
         What is wrong with the record itself, and what was done about it (calib.look).
     known : mapping of str to (U,)
         Effects that the record itself shows, with values near which they are found.
+    sensed : Sensed, optional
+        What the readings measure, where they are not all points of one tracker a run: a reading is
+        then a block of up to three components, in ``position``.
     """
 
     machine: Machine
@@ -70,6 +77,7 @@ class Rows:
     channels: dict[str, Array]
     remarks: tuple[Remark, ...] = ()
     known: Mapping[str, Array] = field(default_factory=dict)
+    sensed: Sensed | None = None
 
     @property
     def count(self) -> int:
@@ -99,25 +107,94 @@ class Rows:
             pose_name=tuple(self.pose_name[row] for row in chosen),
             nest_name=tuple(self.nest_name[row] for row in chosen),
             channels={name: values[chosen] for name, values in self.channels.items()},
+            sensed=None if self.sensed is None else self.sensed.take(chosen),
             **{name: getattr(self, name)[..., chosen] for name in _ARRAYS},
         )
 
     @cached_property
     def unwhitener(self) -> Array:
         """Cholesky factors (3, 3, N) of the covariance, mm: residual = unwhitener @ whitened."""
+        if self.sensed is not None:
+            return self.sensed.root
         factors = np.linalg.cholesky(np.moveaxis(self.covariance, -1, 0))
         return np.asarray(np.moveaxis(factors, 0, -1), dtype=np.float64, order="C")
 
     @cached_property
     def whitener(self) -> Array:
-        """Inverses (3, 3, N) of ``unwhitener``: whitened residual = whitener @ residual."""
+        """Inverses (3, 3, N) of ``unwhitener``: whitened residual = whitener @ residual.
+
+        Zero for components that a reading does not hold.
+        """
+        if self.sensed is not None:
+            return self.sensed.whitener
         inverse = np.linalg.inv(np.moveaxis(self.unwhitener, -1, 0))
         return np.asarray(np.moveaxis(inverse, 0, -1), dtype=np.float64)
 
+    @cached_property
+    def live(self) -> BoolArray:
+        """Components (3, N) that the readings hold."""
+        if self.sensed is None:
+            return np.ones((3, self.count), dtype=bool)
+        return self.sensed.seen
+
+    @cached_property
+    def components(self) -> IntArray:
+        """Number (N,) of components that each reading holds."""
+        return np.asarray(self.live.sum(axis=0), dtype=np.intp)
+
+    @cached_property
+    def placed(self) -> BoolArray:
+        """Readings (N,) that say where an SMR or a target is, in all three directions."""
+        if self.sensed is None:
+            return np.ones(self.count, dtype=bool)
+        pointed = np.isin(self.sensed.kind, (POINT, POSE)) & ~self.sensed.turn
+        return np.asarray(pointed & np.all(self.in_millimetres, axis=0))
+
+    @cached_property
+    def optical(self) -> BoolArray:
+        """Readings (N,) of an instrument in a frame of its own, whose errors are a tracker's."""
+        return np.asarray(self.frame != BASE)
+
+    @cached_property
+    def in_millimetres(self) -> BoolArray:
+        """Components (3, N) that say something in mm.
+
+        They are held, a length, and not a hundred times vaguer than the best of their run are.
+        """
+        lengths = self.live.copy()
+        if self.sensed is not None:
+            lengths &= ~self.sensed.angular
+        variance = np.einsum("iin->in", self.covariance)
+        own = np.where(lengths, variance, np.inf)
+        for run in np.unique(self.run):
+            here = self.run == run
+            least = np.min(own[:, here], axis=0)
+            least = least[np.isfinite(least)]
+            if least.size:
+                lengths[:, here] &= own[:, here] <= VAGUE**2 * np.median(least)
+        return np.asarray(lengths)
+
+    @cached_property
+    def frame(self) -> IntArray:
+        """Which base frame (N,) each reading is seen in: one a run, or of ``frames``."""
+        return self.run if self.sensed is None else self.sensed.frame
+
+    @cached_property
+    def frames(self) -> tuple[FrameOf, ...]:
+        """Base frames to be found: one for each instrument of a run with a frame of its own."""
+        if self.sensed is None:
+            return tuple(FrameOf(run, "", None) for run in range(len(self.runs)))
+        return self.sensed.frames
+
     def in_mm(self, whitened: Array, which: Selection = slice(None)) -> Array:
-        """Displacements (..., 3, M) in sigmas of the readings ``which``, in mm."""
+        """Displacements (..., 3, M) in sigmas of the readings ``which``, in mm.
+
+        Zero for components that say nothing in mm.
+        """
         factors = self.unwhitener[:, :, which]
-        return np.asarray(np.einsum("ijn,...jn->...in", factors, whitened))
+        moved = np.asarray(np.einsum("ijn,...jn->...in", factors, whitened))
+        told = self.in_millimetres[:, which]
+        return moved if told.all() else moved * told
 
     def has(self, name: str) -> bool:
         """Whether there is a state column of that name."""
@@ -132,6 +209,16 @@ class Rows:
             return self.path.stop[self.at][None].astype(np.float64)
         values = getattr(self, name) if name in STATES else self.channels[name]
         return np.atleast_2d(np.asarray(values, dtype=np.float64))
+
+    def sort(self, row: int) -> tuple[object, ...]:
+        """What a reading measures, beside its nest: only the same are repeats of one another."""
+        if self.sensed is None:
+            return ()
+        own = self.sensed
+        return (
+            int(own.kind[row]), int(own.frame[row]), bool(own.turn[row]), own.second_name[row],
+            int(own.plane[row]), own.axis[:, row].tobytes(), own.seen[:, row].tobytes(),
+        )  # fmt: skip
 
     def place(self, row: int) -> str:
         """Where a reading stands, for messages."""
@@ -148,7 +235,11 @@ def stack(machine: Machine, runs: Sequence[Run]) -> Rows:
     """
     if not runs:
         raise BadInput("no run is given", remedy="Name at least one run's folder")
-    parts = [_part(machine, run, index) for index, run in enumerate(runs)]
+    blocks = [blocks_of(run) for run in runs]
+    parts = [
+        _part(machine, run, index, rows)
+        for index, (run, (rows, _)) in enumerate(zip(runs, blocks, strict=True))
+    ]
     starts = np.cumsum([0, *(part.path.count for part in parts)])
     names = dict.fromkeys(name for run in runs for name in run.channels)
     return Rows(
@@ -165,6 +256,7 @@ def stack(machine: Machine, runs: Sequence[Run]) -> Rows:
         path=joined_paths([part.path for part in parts]),
         remarks=(),
         known={},
+        sensed=sensed(runs, blocks),
         at=np.concatenate(
             [part.at + start for part, start in zip(parts, starts[:-1], strict=True)]
         ),
@@ -176,9 +268,8 @@ def stack(machine: Machine, runs: Sequence[Run]) -> Rows:
     )
 
 
-def _part(machine: Machine, run: Run, index: int) -> Rows:
-    """One run's readings, on the path of all its rows."""
-    rows = np.flatnonzero(run.measured)
+def _part(machine: Machine, run: Run, index: int, rows: IntArray) -> Rows:
+    """One run's readings in ``rows`` (N,), on the path of all its rows."""
     extension = machine.extension(run.q, run.header.controller_parameters)
     motion = np.array([axis.motion for axis in machine.axes])
     nests = {**run.header.platform_nests, **run.header.base_nests}
@@ -201,7 +292,16 @@ def _part(machine: Machine, run: Run, index: int) -> Rows:
         position=run.position[:, rows],
         covariance=run.covariance[:, :, rows],
         nest=np.array([nests[name] for name in names]).T,
-        on_platform=np.array([name in run.header.platform_nests for name in names]),
+        on_platform=_moving(run, rows),
         fold=holdout_folds(run)[rows].astype(np.intp),
         channels={name: values[rows] for name, values in run.channels.items()},
     )
+
+
+def _moving(run: Run, rows: IntArray) -> BoolArray:
+    """Readings (N,) that move with the platform: not those between two nests on it."""
+    nests = run.header.platform_nests
+    on = np.array([run.nest[row] in nests for row in rows], dtype=bool)
+    if run.sensing is not None:
+        on ^= np.array([run.sensing.second[row] in nests for row in rows], dtype=bool)
+    return on
