@@ -24,7 +24,10 @@ TASKS = (
     ("Measure", ("site", "measure", "resume", "import")),
     ("Identify", ("fit", "compare", "predict")),
     ("Find what the model misses", ("diagnose", "discover")),
-    ("Correct and prove it", ("apply", "undo", "correct", "export", "verify", "iso9283", "report")),
+    (
+        "Correct and prove it",
+        ("auto", "apply", "undo", "correct", "export", "verify", "iso9283", "report"),
+    ),
     ("Look back", ("sessions", "log", "history")),
     ("Without hardware", ("demo", "mock", "simulate", "reproduce")),
 )

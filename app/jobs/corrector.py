@@ -214,7 +214,7 @@ class Solved:
         found, corrector = self.commands, self.corrector
         told = pose_commands(corrector.identified, found).to_xyz_rpy()
         stands = found.standing.poses.to_xyz_rpy()
-        um, mdeg = self._uncertainty()
+        um, mdeg = self.uncertainty()
         return [
             {
                 "wanted": dict(zip(corrector.coordinates, found.wanted[:, k], strict=True)),
@@ -228,7 +228,7 @@ class Solved:
             for k in range(len(found.refused))
         ]
 
-    def _uncertainty(self) -> tuple[Array, Array]:
+    def uncertainty(self) -> tuple[Array, Array]:
         """Standard uncertainty (N,) of place in um (3D) and of direction in mdeg."""
         saved = self.corrector.saved
         finite = np.where(np.isfinite(saved.covariance), saved.covariance, 0.0)

@@ -13,15 +13,19 @@ import click
 from rich.console import Console
 
 from app import answer
+from app.auto import Limits
 from app.console import stopping
 from app.demo.job import Demo, Outcome
 from app.demo.screen import DemoScreen, result_lines
 from app.demo.station import mock_station
 from app.errors import StoppedByOperator
+from app.verbs import auto
 
 COLUMNS = ("peak um", "std um", "peak deg", "std deg")
 REAL_TIME_EVERY, REAL = 6, 100.0
 """With a controller that moves in real time: poses to verify, machine seconds in a second."""
+AUTO_UM, PLAY = 8.0, {"backlash.leg4": 0.02}
+"""With --auto: what is wanted, um RMS, and what is hidden (mm)."""
 
 
 @click.command()
@@ -65,6 +69,16 @@ REAL_TIME_EVERY, REAL = 6, 100.0
     help="LinuxCNC itself, installed on this computer, moves simulated motors.",
 )
 @click.option(
+    "--auto",
+    "target_um",
+    type=click.FloatRange(min=0.0, min_open=True),
+    is_flag=False,
+    flag_value=AUTO_UM,
+    metavar="[UM]",
+    help=f"Let the program decide what to measure until UM holds ({AUTO_UM:g} if not said), on a "
+    "machine with play in one leg.",
+)
+@click.option(
     "--lead",
     default=0.0,
     help="Lead of the mock's screws, mm, if they have no guide; screw-twist is then in the model.",
@@ -76,6 +90,7 @@ def command(
     scale: float,
     out: Path | None,
     device: str | None,
+    target_um: float | None,
     lead: float,
     as_json: bool,
 ) -> None:
@@ -90,6 +105,9 @@ def command(
     folder = out or Path("out") / f"demo-{datetime.now():%Y%m%d-%H%M%S}"
     folder.mkdir(parents=True, exist_ok=True)
     folder = folder.resolve()
+    if target_um is not None:
+        _automatic(folder, seed, scale, target_um, as_json)
+        return
     screen = DemoScreen(Console(stderr=True, highlight=False, quiet=as_json))
     began = time.monotonic()
     more, every = [device] if device else [], 1
@@ -110,6 +128,16 @@ def command(
         as_json,
         f"{answer.table(head, rows)}\n\nreport: {outcome.report}",
     )
+
+
+def _automatic(folder: Path, seed: int, scale: float, target_um: float, as_json: bool) -> None:
+    """The same job, every decision left to the program; see docs/auto.md."""
+    hidden = folder / "hidden.json"
+    hidden.write_text(json.dumps(PLAY), encoding="utf-8")
+    limits = Limits(target_um)
+    with mock_station("hexapod", seed, scale, folder, ["--hidden", str(hidden)]) as site_file:
+        report = asyncio.run(auto.fly(site_file, folder, limits, seed, alone=True, quiet=True))
+    answer.show(report.to_json(), as_json, auto.words(report))
 
 
 async def _run(demo: Demo, site_file: Path) -> Outcome:

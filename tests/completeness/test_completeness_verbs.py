@@ -46,6 +46,7 @@ ASKED: dict[str, tuple[str, ...] | None] = {
     "predict": ("predict", "{}/model.toml", RUN, "--frame"),
     "diagnose": ("diagnose", RUN),
     "discover": ("discover", RUN),
+    "auto": None,
     "apply": None,
     "undo": None,
     "correct": ("correct", "{}/model.toml", "--pose", "0 0 220 0 0 0"),

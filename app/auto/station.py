@@ -1,0 +1,161 @@
+"""Decisions carried out on a station: sessions that are journaled as every other, and the gates."""
+
+import asyncio
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+
+from app.auto.autopilot import Seen
+from app.auto.findings import fresh_poses
+from app.files.fits import read_fit
+from app.files.pose_table import Pose
+from app.files.runs import read_run
+from app.files.site import Site
+from app.jobs.measuring import begin_measuring
+from app.jobs.posing import choose_poses
+from app.session.events import Event
+from app.session.session import Outcome, Session
+from app.session.station import Station
+from app.verification import Verification, judge_session, verification_plan
+from app.writeback.gates import Gates
+from app.writeback.procedure import WriteBack
+from calib.errors import BadInput
+
+Hear = Callable[[Event], None]
+SURE_SIGMAS = 1.645
+"""One-sided, 95 %."""
+
+
+class StationLaboratory:
+    """A site's controller and tracker.
+
+    Parameters
+    ----------
+    site : Site
+    site_file : Path
+        Where it was read from.
+    folder : Path
+        Where sessions get their folders.
+    unattended : bool
+        Nobody answers the questions of sessions.
+    hear : callable
+        Told every event of the sessions.
+    """
+
+    def __init__(
+        self, site: Site, site_file: Path, folder: Path, unattended: bool, hear: Hear
+    ) -> None:
+        self._site, self._site_file, self._folder = site, site_file, folder
+        self._unattended, self._hear = unattended, hear
+        self._running: Session | WriteBack | None = None
+
+    async def stop(self) -> None:
+        """Stop whatever moves at this moment."""
+        if self._running is not None:
+            await self._running.stop()
+
+    def answer(self, prompt: str, choice: str) -> None:
+        """Answer a question of the session that runs."""
+        running = self._running.running if isinstance(self._running, WriteBack) else self._running
+        if running is not None:
+            running.answer_prompt(prompt, choice)
+
+    async def choose(self, count: int, seed: int) -> Mapping[str, Pose]:
+        """Poses for accuracy, see :func:`app.jobs.posing.choose_poses`."""
+        report = await asyncio.to_thread(
+            lambda: choose_poses(site=self._site_file, n=count, seed=seed)
+        )
+        return report.by_label()
+
+    async def measure(
+        self,
+        poses: Mapping[str, Pose],
+        title: str,
+        began: Callable[[str], None],
+        again: str | None,
+    ) -> tuple[str, float]:
+        """Measure poses in a session of its own; its run's folder, and the minutes it took."""
+        session = self._again(again)
+        if session is None:
+            session = begin_measuring(
+                self._site, poses, folder=self._folder, title=title, unattended=self._unattended
+            )
+            began(str(session.folder))
+        outcome = await self._run(session)
+        return str(outcome.run_folder), _minutes(outcome)
+
+    async def verify(self, began: Callable[[str], None], again: str | None) -> Seen:
+        """Measure fresh poses in a session of its own."""
+        session = self._again(again)
+        if session is None:
+            plan = verification_plan(self._site, fresh_poses(self._site.machine), truth=False)
+            session = Session.create(self._site, plan, self._folder, unattended=self._unattended)
+            began(str(session.folder))
+        outcome = await self._run(session)
+        return Seen(*own_part_um(judge_session(outcome.folder)), _minutes(outcome))
+
+    async def apply(self, model: Path) -> Mapping[str, str]:
+        """Write a model through the gates and keep it; what was left out, and why."""
+
+        async def keep(*_: object) -> bool:
+            return True  # every gate has passed
+
+        station = Station(self._site)
+        job = WriteBack(
+            station, read_fit(model), Gates.with_limits({}), self._folder, keep, self._unattended
+        )
+        leave = station.observers.watch(self._hear)
+        self._running = job
+        try:
+            await station.connect()
+            return (await job.run()).proposal.left_out
+        finally:
+            self._running = None
+            leave()
+            await station.close()
+
+    def _again(self, folder: str | None) -> Session | None:
+        """A session that was begun before this program was, if it is still there."""
+        if folder is None:
+            return None
+        with suppress(BadInput):
+            return Session.reopen(Path(folder), unattended=self._unattended)
+        return None
+
+    async def _run(self, session: Session) -> Outcome:
+        leave = session.observers.watch(self._hear)
+        self._running = session
+        try:
+            await session.connect()
+            return await session.run()
+        finally:
+            self._running = None
+            leave()
+            await session.close()
+
+
+def own_part_um(seen: Verification) -> tuple[float, float]:
+    """RMS of the position error without what the tracker's noise adds to it, um; its 95 % limit.
+
+    The mean square of errors with covariance C (3N, 3N) exceeds that of the machine by tr(C) / N,
+    with a variance of 2 tr(C^2) / N^2 where the machine has no error of its own.
+    """
+    assert seen.spread is not None
+    own, lever, common = seen.spread.own, seen.spread.lever, seen.spread.common
+    count = len(own)
+    lever = lever[:, :3].reshape(3 * count, 6)
+    C = lever @ common @ lever.T
+    for k in range(count):
+        C[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] += own[k, :3, :3]
+    shown = float(np.mean(np.sum(seen.position_mm**2, axis=0)))
+    square = max(shown - float(np.trace(C)) / count, 0.0)
+    open_ = np.sqrt(2.0 * np.sum(C * C)) / count
+    return 1e3 * float(np.sqrt(square)), 1e3 * float(np.sqrt(square + SURE_SIGMAS * open_))
+
+
+def _minutes(outcome: Outcome) -> float:
+    """Machine minutes from the first reading to the last."""
+    time_s = read_run(outcome.run_folder).run.time_s
+    return float(time_s.max() - time_s.min()) / 60.0 if time_s.size else 0.0

@@ -1,0 +1,121 @@
+"""Measure, find what is missing, correct and verify until a target holds, deciding by itself
+
+Every decision is journaled with its reason before it is carried out; see docs/auto.md.
+"""
+
+import asyncio
+import math
+from datetime import datetime
+from pathlib import Path
+
+import click
+
+from app import answer
+from app.auto import Decision, Limits
+from app.auto.autopilot import Autopilot
+from app.auto.report import report_of
+from app.auto.station import StationLaboratory
+from app.console import ConsoleFace, in_daemon_thread, stopping, unattended
+from app.files.site import load_site
+from app.jobs.automatic import AutoReport
+from calib.errors import BadInput
+
+
+@click.command()
+@click.option(
+    "--site", "site_file", required=True, type=click.Path(path_type=Path), help="Site file."
+)
+@click.option(
+    "--target-um",
+    type=click.FloatRange(min=0.0, min_open=True),
+    help="RMS position error at fresh poses that is wanted.",
+)
+@click.option(
+    "--hours", type=click.FloatRange(min=0.0, min_open=True), help="Machine time for all readings."
+)
+@click.option(
+    "--first",
+    default=15,
+    show_default=True,
+    type=click.IntRange(6, 60),
+    help="Poses to begin with.",
+)
+@click.option("--no-apply", is_flag=True, help="Write nothing to the machine.")
+@click.option("--seed", default=1, show_default=True, help="Draws the candidates for poses.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    help="Folder of the journal; one that exists is gone on with.  [default: auto-<date and time>]",
+)
+@click.option("--unattended", "alone", is_flag=True, help="Nobody answers questions or says no.")
+@answer.json_option
+def command(
+    site_file: Path,
+    target_um: float | None,
+    hours: float | None,
+    first: int,
+    no_apply: bool,
+    seed: int,
+    out: Path | None,
+    alone: bool,
+    as_json: bool,
+) -> None:
+    """Calibrate the machine of a site until fresh poses show the wanted accuracy.
+
+    A first set is measured; then, again and again: what is missing is looked for, what cannot be
+    told apart is measured for, more poses are measured while the prediction is above the target,
+    and what is good enough is written through the gates and verified at fresh poses. It stops
+    when the target holds, when nothing that can be afforded would change the answer, or at the
+    limit. With somebody at the terminal every decision is asked first.
+    """
+    folder = (out or Path(f"auto-{datetime.now():%Y%m%d-%H%M%S}")).resolve()
+    begun = (folder / "decisions.jsonl").exists()
+    if target_um is None and not begun:
+        raise BadInput("no target", remedy="Say the accuracy that is wanted: --target-um 8")
+    folder.mkdir(parents=True, exist_ok=True)
+    minutes = math.inf if hours is None else 60.0 * hours
+    limits = Limits(target_um or 1.0, minutes, first, not no_apply)
+    report = asyncio.run(
+        fly(site_file, folder, limits, seed, alone=unattended(alone), quiet=as_json)
+    )
+    answer.show(report.to_json(), as_json, words(report))
+
+
+async def fly(
+    site_file: Path, folder: Path, limits: Limits, seed: int, *, alone: bool, quiet: bool
+) -> AutoReport:
+    """Decide and do on a site's station; ``quiet``: of sessions nothing is told but decisions."""
+
+    def reply(prompt: str, choice: str) -> None:
+        laboratory.answer(prompt, choice)
+
+    face = ConsoleFace(reply, 0, quiet=quiet)
+    laboratory = StationLaboratory(
+        load_site(site_file), site_file, folder / "sessions", alone, face.hear
+    )
+
+    async def veto(decision: Decision) -> bool:
+        text = f"{decision.why}. Go on?"
+        given = await in_daemon_thread(
+            lambda: "y" if click.confirm(text, default=True, err=True) else "n"
+        )
+        return given == "y"
+
+    pilot = Autopilot(folder, laboratory, limits, seed, None if alone else veto, answer.say)
+    with stopping(laboratory.stop):
+        return report_of(pilot, await pilot.run(), folder)
+
+
+def words(report: AutoReport) -> str:
+    """Say how it went to a person."""
+    outcome = {True: "reached", False: "not reached", None: "nothing was to be written"}
+    lines = [
+        f"target {report.target_um:g} um: {outcome[report.reached]}. {report.why}",
+        f"{report.poses} poses in {report.minutes:.0f} min of machine time; "
+        f"effects: {', '.join(report.effects) or 'none'}",
+    ]
+    lines += [f"in question: {pair}: {why}" for pair, why in report.in_question.items()]
+    lines.append(f"journal: {report.folder}")
+    if report.model is not None:
+        lines.append(f"model: {report.model}")
+    return "\n".join(lines)

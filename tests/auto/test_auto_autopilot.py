@@ -1,0 +1,100 @@
+"""The loop on a simulated laboratory: what is journaled, and that it goes on where it was."""
+
+import asyncio
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pytest
+
+from app.auto.autopilot import Autopilot, Seen
+from app.auto.journal import NAME, Decisions
+from app.auto.policy import Decision, Limits
+from app.auto.report import report_of
+from app.files.pose_table import Pose, poses_text
+from app.jobs.posing import choose_poses
+from app.jobs.simulating import simulate
+from calib.errors import BadInput
+from drivers.errors import DeviceError
+from tests.answers import faults_of
+
+HIDDEN = {"backlash.leg3": 0.03}
+
+
+class Simulated:
+    """Runs of the mock's physics; what is written is only remembered."""
+
+    def __init__(self, folder: Path, *, lost_at: int = -1) -> None:
+        self.folder, self.lost_at = folder, lost_at
+        self.asked: list[tuple[str, str | None]] = []
+        self.written: list[Path] = []
+
+    async def choose(self, count: int, seed: int) -> Mapping[str, Pose]:
+        return choose_poses("hexapod", count, candidates=200, seed=seed).by_label()
+
+    async def measure(
+        self, poses: Mapping[str, Pose], title: str, began: Callable[[str], None], again: str | None
+    ) -> tuple[str, float]:
+        run = again or str(self.folder / f"run-{len(self.asked)}")
+        self.asked.append((run, again))
+        if again is None:
+            began(run)
+        if len(self.asked) - 1 == self.lost_at:
+            raise DeviceError("tracker: no answer")
+        table = self.folder / f"poses-{len(self.asked)}.csv"
+        table.write_text(poses_text(poses), encoding="utf-8")
+        simulate("hexapod", run, seed=3, poses=table, effects=HIDDEN)
+        return run, 2.0 * len(poses)
+
+    async def apply(self, model: Path) -> Mapping[str, str]:
+        self.written.append(model)
+        return {}
+
+    async def verify(self, began: Callable[[str], None], again: str | None) -> Seen:
+        return Seen(3.0, 5.0, 40.0)
+
+
+def fly(folder: Path, laboratory: Simulated, **more: object) -> tuple[Autopilot, Decision]:
+    pilot = Autopilot(folder, laboratory, Limits(8.0, first=12), **more)  # type: ignore[arg-type]
+    return pilot, asyncio.run(pilot.run())
+
+
+def test_the_whole_way_and_its_journal(tmp_path: Path) -> None:
+    laboratory = Simulated(tmp_path)
+    pilot, last = fly(tmp_path, laboratory)
+    report = report_of(pilot, last, tmp_path)
+    assert faults_of(report.to_json()) == []
+    assert report.reached is True
+    assert report.effects == ("backlash",)
+    assert [d.kind for d in report.decisions][-3:] == ["apply", "verify", "stop"]
+    assert [Path(str(report.model))] == laboratory.written
+    events = [json.loads(line)["event"] for line in (tmp_path / NAME).read_text().splitlines()]
+    assert events.index("decided") < events.index("session") < events.index("done")
+    again, last_again = fly(tmp_path, laboratory)  # nothing is done twice
+    assert last_again == last
+    assert len(laboratory.written) == 1
+    assert len(again.journal.lines) == len(pilot.journal.lines) + 2
+
+
+def test_a_fault_is_raised_and_the_same_session_is_gone_on_with(tmp_path: Path) -> None:
+    with pytest.raises(DeviceError):
+        fly(tmp_path, Simulated(tmp_path, lost_at=0))
+    with (tmp_path / NAME).open("ab") as file:
+        file.write(b'{"event": "do')  # killed while it wrote
+    laboratory = Simulated(tmp_path)
+    asked: list[Decision] = []
+
+    async def veto(decision: Decision) -> bool:
+        asked.append(decision)
+        return len(asked) == 1
+
+    _, last = fly(tmp_path, laboratory, veto=veto)
+    assert laboratory.asked[0] == (str(tmp_path / "run-0"), str(tmp_path / "run-0"))
+    assert (last.kind, last.reached) == ("stop", False)
+    assert laboratory.written == []
+
+
+def test_a_damaged_journal_is_named(tmp_path: Path) -> None:
+    (tmp_path / NAME).write_text('{"event": "begun"}\nnot json\n{"event": "done"}\n')
+    with pytest.raises(BadInput, match=r"decisions\.jsonl:2"):
+        Decisions(tmp_path)

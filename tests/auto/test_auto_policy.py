@@ -1,0 +1,135 @@
+"""The decisions: what is asked first, that nothing beyond the limit is, and that it ends."""
+
+import math
+from dataclasses import replace
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.auto import Decision, Known, Limits, decide
+from app.auto.policy import FEWEST, MOST
+
+EFFECTS = st.sampled_from(["backlash", "screw-pitch", "thermal-growth", "frame-shift"])
+PAIRS = st.tuples(EFFECTS, EFFECTS)
+UM = st.floats(0.1, 500.0)
+knowns = st.builds(
+    Known,
+    poses=st.integers(1, 200),
+    minutes=st.floats(0.0, 600.0),
+    predicted_um=UM,
+    ambiguous=st.lists(PAIRS, max_size=3).map(tuple),
+    hopeless=st.dictionaries(PAIRS, st.just("no"), max_size=3),
+    unexplained=st.booleans(),
+    rounds_unknown=st.integers(0, 4),
+    verified_um=st.none() | UM,
+    applied=st.booleans(),
+    corrections=st.integers(0, 3),
+)
+limits = st.builds(
+    Limits,
+    target_um=UM,
+    minutes=st.just(math.inf) | st.floats(1.0, 1000.0),
+    first=st.integers(6, 60),
+    apply=st.booleans(),
+)
+
+
+@given(limits)
+def test_a_first_set_is_measured_before_anything_else(wanted: Limits) -> None:
+    assert decide(Known(), wanted) == Decision("measure", "nothing was measured yet", wanted.first)
+
+
+@given(knowns, limits)
+def test_no_set_is_larger_than_the_time_left(known: Known, wanted: Limits) -> None:
+    decision = decide(known, wanted)
+    assert decision.count <= MOST
+    if decision.count:
+        each = known.minutes / known.poses
+        assert decision.count * each <= wanted.minutes - known.minutes or each == 0.0
+
+
+@given(knowns, limits)
+def test_a_target_is_reached_by_fresh_poses_and_by_nothing_else(
+    known: Known, wanted: Limits
+) -> None:
+    shown = known.verified_um is not None and known.verified_um <= wanted.target_um
+    assert (decide(known, wanted).reached is True) == shown
+
+
+@given(knowns, limits)
+def test_nothing_is_written_that_is_in_question_or_not_good_enough(
+    known: Known, wanted: Limits
+) -> None:
+    if decide(known, wanted).kind == "apply":
+        assert wanted.apply
+        assert not known.applied
+        assert known.predicted_um <= wanted.target_um
+
+
+@given(knowns, limits)
+def test_what_a_gate_or_the_person_has_refused_is_the_end(known: Known, wanted: Limits) -> None:
+    decision = decide(replace(known, ended="gate condition"), wanted)
+    assert (decision.kind, decision.reached, decision.why) == ("stop", False, "gate condition")
+
+
+def _after(known: Known, decision: Decision, draw: st.DataObject) -> Known:
+    """What a world that may answer anything makes of a decision."""
+    match decision.kind:
+        case "measure" | "tell-apart":
+            hopeless = {**known.hopeless, **({decision.pair: "asked"} if decision.pair else {})}
+            unknown = draw.draw(st.booleans())
+            return replace(
+                known,
+                poses=known.poses + decision.count,
+                minutes=known.minutes + decision.count,
+                predicted_um=draw.draw(UM),
+                hopeless=hopeless,
+                ambiguous=tuple(draw.draw(st.lists(PAIRS, max_size=2))),
+                unexplained=unknown,
+                rounds_unknown=known.rounds_unknown + 1 if unknown else 0,
+                applied=False,
+            )
+        case "apply":
+            return replace(known, applied=True, verified_um=None, corrections=known.corrections + 1)
+        case "verify":
+            return replace(known, verified_um=draw.draw(UM), minutes=known.minutes + 24.0)
+    raise AssertionError(decision)
+
+
+@given(st.data(), limits.filter(lambda wanted: math.isfinite(wanted.minutes)))
+def test_it_ends_in_every_world_at_the_limit_of_time(draw: st.DataObject, wanted: Limits) -> None:
+    known = Known()
+    for _ in range(int(3 * wanted.minutes / FEWEST) + 40):
+        decision = decide(known, wanted)
+        if decision.kind == "stop":
+            return
+        known = _after(known, decision, draw)
+    raise AssertionError("it goes on for ever")
+
+
+def test_more_poses_are_as_many_as_the_prediction_needs() -> None:
+    known = Known(poses=20, minutes=40.0, predicted_um=10.0)
+    decision = decide(known, Limits(8.0))
+    assert decision.kind == "measure"
+    assert decision.count == math.ceil(20 * ((10.0 / 7.2) ** 2 - 1.0))
+    assert decision.expected["predicted_um"] <= 7.2
+
+
+def test_it_stops_before_time_is_spent_that_cannot_be_enough() -> None:
+    known = Known(poses=20, minutes=40.0, predicted_um=40.0)
+    decision = decide(known, Limits(8.0, minutes=80.0))
+    assert (decision.kind, decision.reached) == ("stop", False)
+    assert "the 20 poses for which there is time would bring 28.3 um" in decision.why
+
+
+def test_a_pair_is_told_apart_before_anything_is_written_and_once() -> None:
+    pair = ("screw-pitch", "thermal-growth")
+    known = Known(poses=20, predicted_um=3.0, ambiguous=(pair,))
+    assert decide(known, Limits(8.0)).pair == pair
+    assert decide(replace(known, hopeless={pair: "no poses"}), Limits(8.0)).kind == "apply"
+
+
+def test_fresh_poses_that_disagree_are_looked_into_once() -> None:
+    known = Known(poses=20, predicted_um=3.0, applied=True, corrections=1, verified_um=20.0)
+    assert decide(known, Limits(8.0)).kind == "measure"
+    assert decide(replace(known, corrections=2), Limits(8.0)).reached is False
