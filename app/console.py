@@ -68,8 +68,9 @@ class ConsoleFace:
 
     async def _ask(self, prompt: ev.PromptNeeded) -> None:
         self._progress.stop()
-        text = f"{prompt.text} ({'/'.join(prompt.choices)})"
-        choice = click.Choice(prompt.choices)
+        instead = f", or {prompt.typed}" if prompt.typed else ""
+        text = f"{prompt.text} ({'/'.join(prompt.choices)}{instead})"
+        choice = click.STRING if prompt.typed else click.Choice(prompt.choices)
 
         def ask() -> str:
             default = prompt.default

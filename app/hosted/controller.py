@@ -145,7 +145,8 @@ class HostedController:
         extension = await asyncio.to_thread(self._commander.extension, pose)
         self._say_what_is_left()
         q = await self._means.send(extension)
-        self._commander.sent(q)
+        if not self.by_hand:  # a person says on arrival where it was brought
+            self._commander.sent(q)
         return q
 
     async def move_to_actuators(self, q: tuple[float, ...]) -> tuple[float, ...]:
@@ -179,6 +180,8 @@ class HostedController:
     async def wait_arrived(self, timeout: float) -> None:
         """Wait until everything that moves has reached its target."""
         await self._means.device.wait_arrived(timeout)
+        if self.by_hand:
+            self._commander.sent(tuple(one.position for one in (await self.state()).actuators))
         self._commander.arrived()
 
     async def stop(self) -> None:

@@ -183,13 +183,15 @@ class DriftChecked(Event):
 class PromptNeeded(Event):
     """The operator is asked; answer with :meth:`Session.answer_prompt` (one of ``choices``).
 
-    ``default`` is what an unattended session answers; ``None``: a person must.
+    ``default`` is what an unattended session answers; ``None``: a person must. ``typed`` says what
+    may be answered in words of one's own instead of a choice; empty: nothing.
     """
 
     prompt: str
     text: str
     choices: tuple[str, ...]
     default: str | None
+    typed: str = ""
 
 
 @dataclass(frozen=True)

@@ -96,6 +96,7 @@ class Work:
         """Whether standing faults end the session: from the moment when old ones are cleared."""
         self.losses = 0
         self._prompts: dict[str, tuple[tuple[str, ...], asyncio.Future[str]]] = {}
+        """What each open question may be answered with (empty: anything), and its answer."""
         self._asked = 0
 
     # shorthands
@@ -192,8 +193,9 @@ class Work:
         choices: tuple[str, ...],
         default: str | None = None,
         fault: DeviceError | None = None,
+        typed: str = "",
     ) -> str:
-        """Ask the operator.
+        """Ask the operator; ``typed`` says what may be answered instead of a choice, if anything.
 
         Unattended, the answer is ``default``; where that is None, ``fault`` is raised.
         """
@@ -205,8 +207,8 @@ class Work:
         self._asked += 1
         prompt = f"prompt-{self._asked}"
         answer: asyncio.Future[str] = asyncio.get_running_loop().create_future()
-        self._prompts[prompt] = (choices, answer)
-        self.tell(PromptNeeded(prompt, text, choices, default))
+        self._prompts[prompt] = (() if typed else choices, answer)
+        self.tell(PromptNeeded(prompt, text, choices, default, typed))
         given = ""
         try:
             given = await answer
@@ -221,7 +223,7 @@ class Work:
         if prompt not in self._prompts:
             return  # somebody else was first
         choices, future = self._prompts[prompt]
-        if choice not in choices:
+        if choices and choice not in choices:
             raise GateRefused(f'"{choice}" is not an answer', remedy=f"Choose {choices}")
         if not future.done():
             future.set_result(choice)

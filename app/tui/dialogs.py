@@ -110,6 +110,18 @@ class Ask(Choose):
     def __init__(self, prompt: PromptNeeded, asked_still: Callable[[], bool]) -> None:
         super().__init__("The job asks you", prompt.text, prompt.choices, first=prompt.default)
         self._asked_still = asked_still
+        self._typed = prompt.typed
+
+    def body(self) -> ComposeResult:
+        """The question, its answers, and a line where it may be answered in other words."""
+        yield from super().body()
+        if self._typed:
+            yield Input(placeholder=self._typed)
+
+    @on(Input.Submitted)
+    def _entered(self, event: Input.Submitted) -> None:
+        if event.value.strip():
+            self.dismiss(event.value.strip())
 
     def on_mount(self) -> None:
         """Close by itself when somebody else has answered, or the job has ended."""

@@ -1,15 +1,18 @@
 """Actuators that a person sets: by hand wheels, or at the panel of another controller."""
 
 import asyncio
+import math
 from collections.abc import Awaitable, Callable, Sequence
 
 from drivers.errors import LinkLost, Refused
 from drivers.interface import ActuatorState, Alarm, ControllerCan, ControllerState, Identity
 from drivers.kind import ActuatorFacts
 
-Ask = Callable[[str, tuple[str, ...]], Awaitable[str]]
+Ask = Callable[[str, tuple[str, ...], str], Awaitable[str]]
+"""Brings a question to the person: its text, the answers to choose from, and what may be typed."""
 DONE, CANNOT = "done", "cannot be reached"
 DIGITS = {"mm": 4, "rad": 6}
+NEAR = 0.02
 
 
 class PersonMoves:
@@ -23,13 +26,18 @@ class PersonMoves:
     actuators : sequence of ActuatorFacts
     serial : str
         Serial number of the machine, as the site file says.
+    near : float
+        Part of each range by which values that the person types may differ from those asked for.
     """
 
-    def __init__(self, actuators: Sequence[ActuatorFacts], serial: str = "") -> None:
+    def __init__(
+        self, actuators: Sequence[ActuatorFacts], serial: str = "", near: float = NEAR
+    ) -> None:
         self.identity = Identity("operator", product="moved by a person", serial=serial)
         self.can = ControllerCan(parameters=False, homes=False)
         self.ask: Ask | None = None
         self._actuators = tuple(actuators)
+        self._near = near
         self._at = self._to = tuple(actuator.home for actuator in actuators)
         self._enabled = False
         self._closed = False
@@ -97,6 +105,9 @@ class PersonMoves:
     async def wait_arrived(self, timeout: float) -> None:
         """Ask the person to move the machine; a person has no deadline, a stop ends it.
 
+        The person says that it is there, or types the actuator values that were really reached:
+        those count from then on. Values that cannot be are asked for again, with the reason.
+
         Raises
         ------
         Refused
@@ -110,19 +121,55 @@ class PersonMoves:
                 device=self.identity.kind,
                 remedy="Measure in a terminal, with somebody at the machine",
             )
-        if await self._answer(self.ask) != DONE:
-            self._to = self._at
-            raise Refused(
-                "the operator could not bring the machine there",
-                device=self.identity.kind,
-                remedy="Skip the pose, or choose others with pkmcal poses",
-            )
+        wrong = ""
+        while (said := await self._answer(self.ask, wrong)) != DONE:
+            if said == CANNOT:
+                self._to = self._at
+                raise Refused(
+                    "the operator could not bring the machine there",
+                    device=self.identity.kind,
+                    remedy="Skip the pose, or choose others with pkmcal poses",
+                )
+            try:
+                self._to = self._typed(said)
+            except ValueError as impossible:
+                wrong = f"{impossible}. "
+            else:
+                break
         self._at = self._to
 
-    async def _answer(self, ask: Ask) -> str:
+    def _typed(self, said: str) -> tuple[float, ...]:
+        """Actuator values that a person typed; raises ValueError that says what is wrong."""
+        words = said.replace(";", " ").replace("=", " = ").split()
+        names = [one.name for one in self._actuators]
+        if "=" in words:
+            named = dict(zip(words[0::3], words[2::3], strict=False))
+            if words[1::3] != ["="] * len(names) or list(named) != names:
+                raise ValueError(
+                    f"Type {', '.join(f'{name}=...' for name in names)}, or values alone"
+                )
+            words = list(named.values())
+        if len(words) != len(names):
+            raise ValueError(f"{len(words)} values were typed, there are {len(names)} actuators")
+        values = tuple(map(_number, words))
+        for one, value, asked in zip(self._actuators, values, self._to, strict=True):
+            low, high = one.limits
+            if not low <= value <= high:
+                raise ValueError(
+                    f"{one.name} = {value:g} {one.unit} is outside {low:g} to {high:g}"
+                )
+            if abs(value - asked) > self._near * (high - low):
+                raise ValueError(
+                    f"{one.name} = {value:g} {one.unit} is {abs(value - asked):.4g} from what was "
+                    "asked for: a slip of the pen, or another pose"
+                )
+        return values
+
+    async def _answer(self, ask: Ask, before: str) -> str:
         """The person's answer; raises Refused if a stop comes before it."""
-        text = f"Move the machine to {self._wanted()}."
-        asking = asyncio.ensure_future(ask(text, (DONE, CANNOT)))
+        text = f"{before}Move the machine to {self._wanted()}."
+        typed = f"the values reached: {' '.join(one.name for one in self._actuators)}"
+        asking = asyncio.ensure_future(ask(text, (DONE, CANNOT), typed))
         stopping = asyncio.ensure_future(self._stopped.wait())
         try:
             await asyncio.wait([asking, stopping], return_when=asyncio.FIRST_COMPLETED)
@@ -153,3 +200,14 @@ class PersonMoves:
         """There is no link; nobody is asked any more."""
         self._enabled, self._closed = False, True
         self._stopped.set()
+
+
+def _number(word: str) -> float:
+    """A finite number; raises ValueError in words."""
+    try:
+        value = float(word)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ValueError(f'"{word}" is no number (write 12.5, with a point)')
+    return value

@@ -252,7 +252,7 @@ async def by_hand_bench() -> AsyncIterator[MotorsBench]:
     facts = tuple(ActuatorFacts(a.name, a.unit, a.home, a.limits) for a in machine.actuators)
     home = tuple(fact.home for fact in facts)
 
-    async def ask(text: str, choices: tuple[str, ...]) -> str:
+    async def ask(text: str, choices: tuple[str, ...], typed: str) -> str:
         await asyncio.sleep(BY_HAND_S)
         return choices[0]
 

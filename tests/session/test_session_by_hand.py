@@ -6,10 +6,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from session_mock import POSES, Mock
 
 from app.errors import StoppedByOperator
+from app.files.machines import load_machine
 from app.files.runs import read_run
 from app.files.site import Site, parse_site
 from app.session import PlanOptions, Session, measure_plan
@@ -20,6 +22,8 @@ from calib.model import Model
 from calib.runs.stack import stack
 from drivers.canopen import CanopenController
 from drivers.errors import DeviceError, NoTarget, Refused
+from drivers.kind import ActuatorFacts
+from drivers.operator.motors import PersonMoves
 
 OPTIONS = PlanOptions(order="pose-by-pose", warm_up=False, two_face=False)
 
@@ -38,8 +42,10 @@ def by_hand(mock: Mock, folder: Path) -> Site:
 class Person:
     """Moves the mock as asked, by its own panel, and answers."""
 
-    def __init__(self, panel: CanopenController, says: str = "done") -> None:
-        self.panel, self.says = panel, says
+    def __init__(
+        self, panel: CanopenController, says: str = "done", beside_mm: float = 0.0
+    ) -> None:
+        self.panel, self.says, self.beside_mm = panel, says, beside_mm
         self.session: Session | None = None
         self.asked: list[str] = []
         self._busy: set[asyncio.Task[None]] = set()
@@ -53,11 +59,15 @@ class Person:
     async def _answer(self, prompt: ev.PromptNeeded) -> None:
         self.asked.append(prompt.text)
         if self.says == "done":
-            q = tuple(float(v) for v in re.findall(r"q\d = (\S+) mm", prompt.text))
+            asked = re.findall(r"q\d = (\S+) mm", prompt.text)
+            q = tuple(float(v) + self.beside_mm for v in asked)
             await self.panel.move_to_q(q)
             await self.panel.wait_arrived(30.0)
+        says = self.says
+        if self.beside_mm:
+            says = " ".join(f"{value:.4f}" for value in q)
         assert self.session is not None
-        self.session.answer_prompt(prompt.prompt, self.says)
+        self.session.answer_prompt(prompt.prompt, says)
 
 
 async def panel_of(mock: Mock) -> CanopenController:
@@ -86,6 +96,61 @@ async def test_a_run_is_measured_without_a_link(
     found = fit(Model(stack(loaded.machine, [loaded.run]), []))
     assert not found.bad
     assert loaded.run.header.controller_serial == "17"
+
+
+async def test_what_was_really_reached_is_typed_and_goes_into_the_run(
+    mock_of: Callable[..., Mock], tmp_path: Path
+) -> None:
+    mock = mock_of("--smrs", "3")
+    panel = await panel_of(mock)
+    person = Person(panel, beside_mm=0.4)
+    site = by_hand(mock, tmp_path)
+    session = person.session = Session.create(site, measure_plan(site, POSES, OPTIONS), tmp_path)
+    session.observers.watch(person.hear)
+    try:
+        outcome = await session.run()
+    finally:
+        await session.close()
+        await panel.close()
+    loaded = read_run(outcome.run_folder)
+    asked = re.findall(r"q1 = (\S+) mm", next(t for t in person.asked if "Pose c" in t))
+    rows = [k for k, pose in enumerate(loaded.run.pose) if pose == "c"]
+    assert loaded.run.q[0, rows] == pytest.approx(float(asked[0]) + 0.4, abs=1e-4)
+    assert np.all(loaded.run.measured[rows])  # the values asked for are no stop on the way
+    found = fit(Model(stack(loaded.machine, [loaded.run]), []))
+    assert not found.bad
+
+
+@pytest.mark.parametrize(
+    ("typed", "wrong"),
+    [
+        ("q1=1 q2=2", "or values alone"),
+        ("230 231 232", "3 values were typed"),
+        ("230 231 232 233 234 nan", '"nan" is no number'),
+        ("230,7 231 232 233 234 235", '"230,7" is no number'),
+        ("990 230.7 230.7 230.7 230.7 230.7", "outside 195 to 265"),
+        ("203.7 230.7 230.7 230.7 230.7 230.7", "a slip of the pen"),
+    ],
+)
+async def test_values_that_cannot_be_are_asked_for_again(typed: str, wrong: str) -> None:
+    machine = load_machine("hexapod")
+    facts = [ActuatorFacts(a.name, a.unit, a.home, a.limits) for a in machine.actuators]
+    person, asked = PersonMoves(facts), list[str]()
+    answers = [typed, " ".join(f"{fact.name}=231" for fact in facts)]
+
+    async def ask(text: str, choices: tuple[str, ...], instead: str) -> str:
+        asked.append(text)
+        return answers[len(asked) - 1]
+
+    person.ask = ask
+    await person.enable()
+    await person.move_actuators((231.2,) * 6)
+    await person.wait_arrived(1.0)
+    assert wrong in asked[1]
+    assert wrong not in asked[0]
+    state = await person.state()
+    assert [one.position for one in state.actuators] == [231.0] * 6
+    assert not state.moving
 
 
 @pytest.mark.parametrize(

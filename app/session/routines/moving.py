@@ -43,7 +43,8 @@ async def go(work: Work, label: str) -> None:
     """Command a pose, write down the controller's targets, and wait for the arrival.
 
     The row is written as soon as the controller accepted: whatever happens then, the journal
-    knows where the machine was sent, which the direction of approach depends on.
+    knows where the machine was sent, which the direction of approach depends on. Where a person
+    moves the machine it is written on arrival, with the actuator values that were reached.
     """
     memory = work.memory
     memory.standing_at, memory.settled = None, False
@@ -52,19 +53,30 @@ async def go(work: Work, label: str) -> None:
         work.controller.told({"delay_s": memory.delay_s, **await channels(work)})
         work.controller.ask_with(partial(_ask_for_pose, work, label))
     q = await work.controller.move_to_pose(commanded_coordinates(work.site.machine, pose))
-    memory.q = q
-    row = NewRow("move", work.clock.now(), label, q)
-    work.journal.add_row(work.step, work.attempt, work.clock.utc(), row)
-    work.tell(PoseCommanded(label, pose, q, row.time_s))
+    by_hand = isinstance(work.controller, HostedController) and work.controller.by_hand
+    if not by_hand:
+        _write_move(work, label, q)
+    work.tell(PoseCommanded(label, pose, q, work.clock.now()))
     live = asyncio.create_task(_show_move(work), name="live pose")
     try:
         await work.controller.wait_arrived(_timeout(work))
     finally:
         live.cancel()
         await asyncio.gather(live, return_exceptions=True)
+    if by_hand:
+        # Where a person brought it is known once it is there, and may be beside what was asked.
+        q = tuple(one.position for one in (await work.controller.state()).actuators)
+        _write_move(work, label, q)
     memory.standing_at = label
     memory.arrived_s = work.clock.now()
     work.tell(LivePose(q, q, moving=False))
+
+
+def _write_move(work: Work, label: str, q: tuple[float, ...]) -> None:
+    """Write down where the machine was sent, in its actuators."""
+    work.memory.q = q
+    row = NewRow("move", work.clock.now(), label, q)
+    work.journal.add_row(work.step, work.attempt, work.clock.utc(), row)
 
 
 async def nudge(work: Work, controller: HostedController, q: tuple[float, ...]) -> None:
@@ -78,9 +90,11 @@ async def nudge(work: Work, controller: HostedController, q: tuple[float, ...]) 
     memory.arrived_s = work.clock.now()
 
 
-async def _ask_for_pose(work: Work, label: str, text: str, choices: tuple[str, ...]) -> str:
+async def _ask_for_pose(
+    work: Work, label: str, text: str, choices: tuple[str, ...], typed: str
+) -> str:
     """Ask the person who moves the machine; unattended, nobody does."""
-    return await work.ask(f"Pose {label}. {text}", choices)
+    return await work.ask(f"Pose {label}. {text}", choices, typed=typed)
 
 
 def commanded_coordinates(machine: Machine, pose: Pose) -> tuple[float, ...]:
