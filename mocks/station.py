@@ -33,6 +33,8 @@ from mocks.canopen.server import CanopenStation
 from mocks.clock import ScaledClock
 from mocks.control import ControlServer, Hands
 from mocks.gcs.server import GcsStation
+from mocks.geocom.instrument import SERIAL as STATION_SERIAL
+from mocks.geocom.server import GeoComServer
 from mocks.hidden.table import Hidden
 from mocks.linuxcnc.body import StrutsBody
 from mocks.linuxcnc.server import LinuxCncStation
@@ -77,6 +79,7 @@ class MockStation:
         bare: bool = False,
         own: OwnFiles | None = None,
         linuxcnc: Path | None = None,
+        geocom: bool = False,
     ) -> None:
         self.world = world
         self.clock = clock
@@ -95,6 +98,7 @@ class MockStation:
         )
         self.tracker = TrackerServer(world, clock, host, ports[1])
         self.lines = LineServer(world, clock, host) if lines else None
+        self.total_station = GeoComServer(world, clock, host) if geocom else None
         self.control = ControlServer(Hands(world, self.tracker, self.controller), host, ports[2])
 
     async def start(self) -> None:
@@ -103,6 +107,8 @@ class MockStation:
         await self.tracker.start()
         if self.lines is not None:
             await self.lines.start()
+        if self.total_station is not None:
+            await self.total_station.start()
         await self.control.start()
 
     async def stop(self) -> None:
@@ -110,6 +116,8 @@ class MockStation:
         await self.control.stop()
         if self.lines is not None:
             await self.lines.stop()
+        if self.total_station is not None:
+            await self.total_station.stop()
         await self.tracker.stop()
         await asyncio.to_thread(self.controller.stop)
 
@@ -160,6 +168,11 @@ class MockStation:
         if self.lines is not None:
             return {
                 "kind": "line-stream", "address": self.lines.address, "sigma_mm": LINES_SIGMA_MM,
+            }  # fmt: skip
+        if self.total_station is not None:
+            return {
+                "kind": "geocom", "port": self.total_station.address, "serial": str(STATION_SERIAL),
+                "sigma_arcsec": 0.6, "sigma_distance_mm": 0.26, "reflector": "mini",
             }  # fmt: skip
         return {
             "kind": "emscon", "address": self.tracker.address, "serial": str(SERIAL),
@@ -250,6 +263,10 @@ def parser() -> argparse.ArgumentParser:
         help="the tracker only sends x y z lines (the driver of examples/line_tracker)",
     )  # fmt: skip
     parser.add_argument(
+        "--geocom", action="store_true",
+        help="the tracker is a total station that speaks GeoCOM (kind geocom)",
+    )  # fmt: skip
+    parser.add_argument(
         "--pose", action="store_true",
         help="hexapod: a closed controller that takes poses over GCS and shows no parameters",
     )  # fmt: skip
@@ -304,7 +321,7 @@ def build(options: argparse.Namespace) -> MockStation:
         raise ValueError("LinuxCNC (--linuxcnc) moves a hexapod, and holds its parameters itself")
     return MockStation(
         world, clock, options.nvm, ports, options.serial, options.lines, options.pose,
-        options.bare, own, options.linuxcnc,
+        options.bare, own, options.linuxcnc, options.geocom,
     )  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from drivers.emscon import EmsconTracker
 from drivers.emscon.settings import EmsconSettings
 from drivers.gcs import GcsController
 from drivers.gcs.pose_kind import KIND as POSE
+from drivers.geocom.kind import KIND as GEOCOM
 from drivers.interface import MotionController, Motors, PoseMover, Tracker
 from drivers.kind import ActuatorFacts, Strut, Surroundings
 from drivers.lines.kind import KIND as LINES
@@ -25,6 +26,7 @@ from mocks.canopen.bare_site import bare_site
 from mocks.canopen.server import CanopenStation
 from mocks.clock import ScaledClock
 from mocks.gcs.server import GcsStation
+from mocks.geocom.server import GeoComServer
 from mocks.linuxcnc.body import StrutsBody
 from mocks.linuxcnc.server import LinuxCncStation
 from mocks.linuxcnc.site import linuxcnc_site
@@ -235,8 +237,39 @@ async def lines_bench() -> AsyncIterator[TrackerBench]:
         await server.stop()
 
 
+@contextlib.asynccontextmanager
+async def geocom_bench() -> AsyncIterator[TrackerBench]:
+    """A total station."""
+    clock = ScaledClock(SCALE)
+    world = World(clock, WorldPlan(seed=4, smrs=3))
+    server = GeoComServer(world, clock)
+    await server.start()
+    stated = {"port": server.address, "sigma_arcsec": 0.6, "sigma_distance_mm": 0.26}
+    settings = {one.name: stated.get(one.name, one.default) for one in GEOCOM.settings}
+    settings["margin_s"] = 1.0
+
+    async def connect() -> Tracker:
+        return await GEOCOM.open(Surroundings(settings, "", "hexapod", (), {}, SCALE))
+
+    async def target() -> tuple[float, float, float]:
+        x, y, z = world.nest_in_tracker("3", np.array([clock.now()]))[0]
+        return float(x), float(y), float(z)
+
+    async def hide() -> None:
+        world.faults.inject("tracker-lost")
+
+    async def silence() -> None:
+        world.faults.inject("tracker-silent")
+
+    try:
+        yield TrackerBench(connect, LONGEST_S, target, hide, silence)
+    finally:
+        await server.stop()
+
+
 TRACKERS: dict[str, Callable[..., contextlib.AbstractAsyncContextManager[TrackerBench]]] = {
     "emscon": emscon_bench,
+    "geocom": geocom_bench,
     "lines": lines_bench,
 }
 CONTROLLERS = {"canopen": "hexapod", "gcs": "tripod"}

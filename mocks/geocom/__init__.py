@@ -1,0 +1,1 @@
+"""A total station that speaks GeoCOM, in the room of the mock machine."""
