@@ -61,6 +61,8 @@ POSE_SITE = {
 }  # fmt: skip
 """How a closed hexapod's poses are to be read."""
 LINES_SIGMA_MM = 0.006
+STATION_LIMITS = {"base_fit_mm": 0.6, "drift_mm": 0.8, "two_face_mm": 1.5}
+"""What is normal with a total station, whose readings are good to 0.3 mm."""
 FRAME_ERROR_MM, FRAME_ERROR_RAD = 3.0, 0.003
 
 
@@ -202,6 +204,7 @@ class MockStation:
                 "payload_com": list(load.payload_com),
                 **self._told_payload(),
             },
+            **({} if self.total_station is None else {"limits": dict(STATION_LIMITS)}),
             "clock": {"scale": self.clock.scale},
         }  # fmt: skip
 
