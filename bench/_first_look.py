@@ -32,7 +32,8 @@ def clean(seed: int) -> tuple[str, tuple[str, ...]]:
         rows = first_look(machine_named(machine), [run])
     except BadInput as error:
         return effect, (str(error),)
-    return effect, tuple(remark.name for remark in rows.remarks)
+    right = {"actuator-step": "actuator-slipped"}.get(effect)
+    return effect, tuple(remark.name for remark in rows.remarks if remark.name != right)
 
 
 def _where(seed: int) -> tuple[str, str]:

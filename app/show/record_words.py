@@ -21,6 +21,11 @@ def record_lines(report: Mapping[str, Any]) -> list[str]:
     return [*lines, ""] if lines else []
 
 
+def remark_lines(report: Mapping[str, Any]) -> list[str]:
+    """One line for each hypothesis, for screens: what is wrong, what was done about it."""
+    return [f"{one['says']}. {one['done']}." for one in report.get("record", ())]
+
+
 def excluded_lines(report: Mapping[str, Any]) -> list[str]:
     """Excluded readings, one a line while they are few, else in ranges by their reason."""
     bad = report["bad_readings"]

@@ -10,6 +10,7 @@ from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.content import Content
 from textual.widgets import DataTable, Static
 
+from app.show.record_words import remark_lines
 from app.tui.choosing import ask_for_model_file, choose_runs
 from app.tui.dialogs import Pick
 from app.tui.face import Face
@@ -225,7 +226,11 @@ def advice_text(view: "View | None") -> Content:
         return Content("")
     diagnosis = view.diagnosis
     mark = ("✓ ", "$success") if diagnosis["adequate"] else ("! ", "$warning")
-    text = Content.assemble(mark, diagnosis["advice"])
+    told = [
+        said for said in remark_lines(diagnosis) if said.split(". ")[0] not in diagnosis["advice"]
+    ]
+    first = [(f"{said}\n", "$warning") for said in told]
+    text = Content.assemble(*first, mark, diagnosis["advice"])
     for group in diagnosis["indistinguishable"]:
         text = Content.assemble(text, ("  Cannot be told apart: ", "bold"), ", ".join(group), ".")
     return text

@@ -11,6 +11,7 @@ from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.content import Content
 from textual.widgets import DataTable, Static
 
+from app.show.record_words import excluded_lines, remark_lines
 from app.tui.choosing import ask_for_model_file, choose_runs
 from app.tui.face import Face
 from app.tui.picture import Picture
@@ -157,7 +158,9 @@ def words(answer: "FitAnswer | None") -> Content:
         return Content("")
     report = answer.report
     chi2 = report["chi2_per_dof"]
-    parts: list[Content] = []
+    parts: list[Content] = [
+        Content.from_markup("[$warning]![/] $said", said=said) for said in remark_lines(report)
+    ]
     if chi2 is not None and chi2 > 1.25:
         parts.append(
             Content.from_markup(
@@ -166,8 +169,7 @@ def words(answer: "FitAnswer | None") -> Content:
             )
         )
     parts += [
-        Content.from_markup("[$warning]✗[/] line $line: $why", line=bad["line"], why=bad["why"])
-        for bad in report["bad_readings"]
+        Content.from_markup("[$warning]✗[/] $told", told=told) for told in excluded_lines(report)
     ]
     if report["left_out_readings"]:
         parts.append(

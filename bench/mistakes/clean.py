@@ -9,10 +9,12 @@ import numpy as np
 from app.files.machines import load_machine
 from calib.arrays import Array, BoolArray, IntArray
 from calib.frames import Frame, align
+from calib.identify.staged import fit_effects
 from calib.mechanism.description import Machine
 from calib.mechanism.solve import forward
 from calib.runs import parse_run
 from calib.runs.record import Run
+from calib.runs.stack import stack
 from mocks.hidden.table import Hidden
 from mocks.simulate.files import points_csv, run_toml
 from mocks.simulate.plan import Profile, RunPlan
@@ -128,11 +130,15 @@ def platform_turns(run: Run, machine: Machine) -> Array:
 
 
 def moved_actuators(run: Run, machine: Machine, change: Array) -> Run:
-    """Readings as they would be had the actuators gone ``change`` (n, N) farther than said."""
+    """Readings as they would be had the actuators gone ``change`` (n, N) farther than said.
+
+    The machine is that of a fit: the nominal one bends large changes by too much.
+    """
     held = run.header.controller_parameters
     rotation, _ = base_frame(run)
-    there = forward(machine, machine.extension(run.q + change, held)).poses
-    here = forward(machine, machine.extension(run.q, held)).poses
+    true = fit_effects(stack(machine, [run]), []).linear.state.parameters
+    there = forward(machine, machine.extension(run.q + change, held), true).poses
+    here = forward(machine, machine.extension(run.q, held), true).poses
     nests = np.array(
         [run.header.platform_nests.get(name, np.full(3, np.nan)) for name in run.nest]
     ).T

@@ -12,16 +12,20 @@ from calib.arrays import Array
 from calib.look.clock import clock
 from calib.look.conventions import check_conventions, check_lengths
 from calib.look.digits import rounding
+from calib.look.held import held_actuator
 from calib.look.labels import any_labels, mirrored_table, other_labels
 from calib.look.load import load_and_payload
-from calib.look.misfit import look_at_misfit
+from calib.look.misfit import look_at_misfit, seat_refined
 from calib.look.moved import moved_station, parts_of
 from calib.look.places import Places, places_of
+from calib.look.point_units import point_units
 from calib.look.pose_labels import pose_labels
 from calib.look.proposal import Proposal
 from calib.look.repeats import no_measurements
 from calib.look.seats import displaced_seat
 from calib.look.sigmas import sigmas
+from calib.look.slid import check_columns, slid_rows
+from calib.look.tables import turned_table
 from calib.look.temperatures import temperatures
 from calib.look.travel import check_travel
 from calib.mechanism.description import Machine
@@ -29,6 +33,11 @@ from calib.runs.record import Run
 from calib.runs.remark import Remark
 from calib.runs.stack import Rows, stack
 
+HYPOTHESES = (
+    other_labels, moved_station, mirrored_table, displaced_seat, any_labels, turned_table,
+    slid_rows, held_actuator,
+)  # fmt: skip
+"""What may explain readings that stand in no nest; the first that explains all is taken."""
 MOST_ROUNDS = 4
 """Hypotheses about places that may hold at once."""
 _Known = Mapping[str, Array]
@@ -77,7 +86,7 @@ def rows_alone(machine: Machine, run: Run) -> tuple[Run, list[Remark]]:
     looked, remarks = no_measurements(run)
     if not looked.measured.any():
         return run, remarks  # the fit says that there is nothing
-    for look in (clock, rounding):
+    for look in (clock, point_units, rounding):
         looked, found = look(looked)
         remarks += found
     looked, found = temperatures(looked)
@@ -100,6 +109,7 @@ def _places(machine: Machine, run: Run) -> tuple[list[Run], list[Remark], _Known
             break
         _, inside = places.majority
         count = int(inside.sum())
+        check_columns(places)
         if inside.size - count < places.limit:
             break
         best = _best(places, count)
@@ -107,7 +117,10 @@ def _places(machine: Machine, run: Run) -> tuple[list[Run], list[Remark], _Known
             check_conventions(machine, run, places, 0 if best is None else best.explained)
         if best is None:
             break
-        run, remark = best.take()
+        meant, remark = best.take()
+        if remark.name in {"smr-size", "nest-displaced"}:
+            meant = seat_refined(machine, run, meant)
+        run = meant
         remarks.append(remark)
         if remark.name == "station-moved":
             parts = [run] if best.known else parts_of(places)
@@ -118,7 +131,7 @@ def _places(machine: Machine, run: Run) -> tuple[list[Run], list[Remark], _Known
 def _best(places: Places, count: int) -> Proposal | None:
     """The proposal that explains most readings, where it explains clearly more than ``count``."""
     best: Proposal | None = None
-    for propose in (other_labels, moved_station, mirrored_table, displaced_seat, any_labels):
+    for propose in HYPOTHESES:
         if best is not None and best.explained > places.rows.count - places.limit:
             break
         found = propose(places)

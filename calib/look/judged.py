@@ -1,7 +1,7 @@
 """A fit judged before it is believed: readings left out, sizes and signs that no machine has."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from calib.identify.fitting import Fit
 from calib.identify.readings import MASKED, BadReading
 from calib.identify.starting import MOVED
 from calib.look.places import PART
+from calib.look.strays import groups
 from calib.runs.remark import Remark, lines_in_words, ranges
 from calib.unknown import Estimate, estimates_of
 
@@ -31,9 +32,11 @@ BEYOND = 20.0
 
 def record_of(fitted: Fit) -> tuple[Remark, ...]:
     """What is said first of a fit: of the record, of the readings left out, of sizes and signs."""
+    together = groups(fitted)
     return (
         *fitted.model.rows.remarks,
-        *_left_out(fitted),
+        *(group.remark for group in together),
+        *_left_out(fitted, {row for group in together for row in group.rows}),
         *_geometry(fitted),
         *(
             remark
@@ -48,9 +51,9 @@ def settled(remarks: Sequence[Remark]) -> bool:
     return all(remark.settled for remark in remarks)
 
 
-def _left_out(fitted: Fit) -> Iterator[Remark]:
-    """More readings excluded than strays are: never silently."""
-    bad = [reading for reading in fitted.bad if reading.why != MASKED]
+def _left_out(fitted: Fit, explained: Collection[int]) -> Iterator[Remark]:
+    """More readings excluded than strays are, beside those explained: never silently."""
+    bad = [one for one in fitted.bad if one.why != MASKED and one.row not in explained]
     if not bad:
         return
     rows = fitted.model.rows

@@ -31,8 +31,8 @@ WHOLE = 0.9
 
 def other_labels(places: Places) -> Proposal | None:
     """The labels that the readings have in the frame of the base, or of the majority."""
-    frame = places.from_base if places.from_base is not None else places.majority[0]
-    return _best(places, [frame])
+    frames = [] if places.from_base is None else [places.from_base]
+    return _best(places, [*frames, places.majority[0]])
 
 
 def any_labels(places: Places) -> Proposal | None:
@@ -122,13 +122,19 @@ def _read_as(places: Places, frame: Frame) -> tuple[np.ndarray, BoolArray]:
 def _enough_right(places: Places, true: np.ndarray) -> bool:
     """Whether enough labels are right; where not, the fit refuses the run, with the line.
 
-    An exchange of two is plain even if no other nest was read.
+    An exchange of two is plain even if no other nest was read; so are labels that go round, each
+    read as one other throughout.
     """
     labels = _labels(places)
     wrong = true != labels
     pairs = set(zip(labels[wrong], true[wrong], strict=True))
     exchange = len(pairs) == 2 and {(b, a) for a, b in pairs} == pairs
-    return exchange or bool(np.mean(~wrong) >= MAJORITY)
+    round_ = (
+        len(pairs) == len({label for label, _ in pairs}) == len({name for _, name in pairs})
+        and {label for label, _ in pairs} == {name for _, name in pairs}
+        and all(np.mean(wrong[labels == label]) > WHOLE for label, _ in pairs)
+    )
+    return exchange or round_ or bool(np.mean(~wrong) >= MAJORITY)
 
 
 def _relabelled(places: Places, true: np.ndarray) -> tuple[Run, Remark]:

@@ -16,6 +16,7 @@ from calib.effects.tracker import rigid_motions
 from calib.errors import BadInput
 from calib.identify.fitting import Fit
 from calib.identify.staged import fit_effects
+from calib.look.bent import not_stated, rounded_commands, slip, slip_remark, table_frame
 from calib.look.scan import excess, prior_cost, scan, whitened, with_the_excluded
 from calib.look.seats import ALONG, lifted, normal_of, seated
 from calib.look.sigmas import sigmas_of_all
@@ -72,6 +73,9 @@ def look_at_misfit(
         again = _fit(machine, unit.run, known)
         if again is not None and again.chi2_per_dof < LOUDEST:
             return [unit.run], [unit.remark], {}
+    stated = not_stated(machine, run, fitted)
+    if stated is not None:
+        return [stated.run], [stated.remark], {}
     bent = prior_cost(fitted) > BENT * fitted.model.free.size
     if known or (fitted.chi2_per_dof < LOUD and not bent):
         return [run], [], {}
@@ -79,9 +83,16 @@ def look_at_misfit(
     seat = _seat(fitted)
     if found is not None and (seat is None or found.fall > seat.fall):
         return [run], [_step_remark(fitted, found)], {"frame-shift": found.values}
+    slipped = slip(fitted) if alone else None
+    if slipped is not None and (seat is None or slipped.fall > seat.fall):
+        return [run], [slip_remark(fitted, slipped)], {"actuator-step": slipped.values}
     if seat is not None:
         return _seated(machine, run, fitted, seat)
-    return [run], [], {}
+    mended = table_frame(machine, run, fitted)
+    if mended is not None:
+        return [mended.run], [mended.remark], {}
+    rounded = rounded_commands(run, fitted)
+    return [run], [] if rounded is None else [rounded], {}
 
 
 def _fit(machine: Machine, run: Run, known: _Known) -> Fit | None:
@@ -227,3 +238,16 @@ def _seated(
         more = scan(again, _seat_columns(again, here, room=seat.room)).sizes[0]
         moved, remark = taken(seat.offset + more)
     return [moved], [remark], {}
+
+
+def seat_refined(machine: Machine, before: Run, run: Run) -> Run:
+    """The run with a seat, which was seen by the nominal machine, where a fit puts it."""
+    old, table = before.header.platform_nests, run.header.platform_nests
+    names = [n for n in table if n not in old or not np.array_equal(old[n], table[n])]
+    fitted = _fit(machine, run, {}) if len(names) == 1 else None
+    if fitted is None:
+        return run
+    which = np.array([nest == names[0] for nest in fitted.model.rows.nest_name])
+    more = scan(fitted, _seat_columns(fitted, which & fitted.accepted, room=False)).sizes[0]
+    moved = {**table, names[0]: table[names[0]] + more}
+    return replace(run, header=replace(run.header, platform_nests=moved))

@@ -41,7 +41,9 @@ class Places:
     base : (3, N)
         Where the labelled nest stood, base frame, mm.
     slack : (N,)
-        How far from it a good reading may be, mm.
+        How far from it a good reading may be, mm; more where the machine as a whole seems off.
+    tight : (N,)
+        The same by the tolerances alone, mm.
     """
 
     run: Run
@@ -50,6 +52,7 @@ class Places:
     rotation: Array
     base: Array
     slack: Array
+    tight: Array
 
     @property
     def seen(self) -> Array:
@@ -109,7 +112,9 @@ def places_of(machine: Machine, run: Run) -> Places | None:
         _, linear = aligned(model, base, np.ones(rows.count, dtype=bool))
     except BadInput:
         return None  # the fit says it, with the place
-    slack = slack_of(model, linear)
-    slack = slack + disagreement(model, base, np.arange(rows.count), slack)
+    tight = slack_of(model, linear)
+    slack = tight + disagreement(model, base, np.arange(rows.count), tight)
     poses, (_, state) = model.nominal_configuration.poses, model.states
-    return Places(run, rows, poses.position[:, state], poses.rotation[:, :, state], base, slack)
+    return Places(
+        run, rows, poses.position[:, state], poses.rotation[:, :, state], base, slack, tight
+    )

@@ -15,8 +15,8 @@ from calib.runs.remark import Remark, lines_in_words, ranges
 
 LEAST = 4
 """Readings of a nest that must be off alike."""
-MOST_MM = 25.0
-"""Offset, mm, beyond which it is no seat."""
+MOST_MM = 500.0
+"""Offset, mm, beyond which no number was mistyped."""
 ALONG = 0.95
 """Part of an offset along the normal of the nests from which on it is the SMR's size."""
 RADII = {"1.5 inch": 19.05, "7/8 inch": 11.1125, "0.5 inch": 6.35, "30 mm": 15.0, "20 mm": 10.0}
@@ -138,16 +138,20 @@ def _smr(name: str, where: str, along: float) -> tuple[str, str]:
         f"Nest {name}{where} was read with an SMR of another size: offset of nest {name} by "
         f"{along:+.3f} mm along its normal"
     )
+    says += radii_in_words(abs(along))
+    return says, f"Read nest {name} with the SMR of the others, or correct its height in the table"
+
+
+def radii_in_words(height: float) -> str:
+    """Which SMRs differ in radius by a height, mm, in brackets; empty if none do."""
     pairs = [
-        (abs(abs(one - other) - abs(along)), f"{first} and {second}")
+        (abs(abs(one - other) - height), f"{first} and {second}")
         for first, one in RADII.items()
         for second, other in RADII.items()
         if one > other
     ]
     miss, pair = min(pairs)
-    if miss < MATCH:
-        says += f" (SMRs of {pair} differ by that)"
-    return says, f"Read nest {name} with the SMR of the others, or correct its height in the table"
+    return f" (SMRs of {pair} differ by that)" if miss < MATCH else ""
 
 
 def normal_of(header: Header) -> Array:

@@ -24,7 +24,8 @@ ORDERS = ("nest-by-nest", "pose-by-pose")
 ROWS = [
     name
     for words in (
-        "sigmas in um from the middle", "three sigmas", "points rounded", "time", "temperature",
+        "points in m from", "sigmas in um from the middle", "three sigmas",
+        "points rounded", "time", "temperature",
         "air in", "-127", "85 and 999", "two values of 0", "payload", "gravity in", "is zero",
         "centres of mass", "mass in grams", "zeros", "-1, -1, -1", "z is 0", "repeat",
         "no longer change", "y stands", "twice", "sorted by text", "one label", "labels begin",
@@ -44,6 +45,15 @@ PLACES = {
     "sigmas in um": MACHINES[:1],
     "sigmas in m": MACHINES[:1],
     "sigmas are variances": MACHINES[1:2],
+    "nests go round": MACHINES[1:2],
+    "base nests exchanged": MACHINES[:1],
+    "nest table turned by 90 deg": MACHINES[:1],
+    "nest table 25 mm off in z": MACHINES[:1],
+    "nest table: one sign wrong": MACHINES[1:2],
+    "an actuator clamped from two thirds on": MACHINES[1:2],
+    "an actuator slipped by 20 to 100 um": MACHINES[:1],
+    "an actuator slipped by 0.2 to 1 mm": MACHINES[1:2],
+    "controller parameters not the stated": MACHINES[:1],
 }
 """Mistakes that are seen against the machine."""
 CASES = [
@@ -106,6 +116,48 @@ def test_a_mistake_is_named_and_mended(name, machine, order):
     assert len(fitted.bad) == 0
     assert settled(rows.remarks)
     assert fitted.chi2_per_dof < 1.6
+
+
+REFUSED = {
+    "points in m": "hexapod",
+    "x and y of the points exchanged": "tripod",
+    "two columns of q exchanged": "hexapod",
+    "one column of q stands": "hexapod",
+    "q in degrees": "ptm",
+}
+"""Mistakes that make of a record that of another machine."""
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_would_be_another_machine_is_refused_in_words(name):
+    machine = REFUSED[name]
+    with pytest.raises(BadInput, match=MISTAKES[name].refused):
+        looked(machine, spoiled(MISTAKES[name], name, made(machine, "pose-by-pose")))
+
+
+def test_rows_that_slid_are_put_back():
+    name = "x, y, z one row late from the middle on"
+    rows = looked("hexapod", spoiled(MISTAKES[name], name, made("hexapod", "pose-by-pose")))
+    assert {one.name for one in rows.remarks} <= set(MISTAKES[name].says)
+    fitted = fit_effects(rows, [])
+    assert len(fitted.bad) <= 1
+    assert fitted.chi2_per_dof < 1.6
+
+
+@pytest.mark.parametrize(
+    ("name", "expected", "told"),
+    [
+        ("one q of one pose mistyped", "pose-actuator", "mistyped"),
+        ("a base nest knocked by 0.3 to 2 mm", "nest-moved", "moved before line"),
+        ("base table: one number 1 to 10 mm off", "nest-moved", "is not where the table says"),
+    ],
+)
+def test_excluded_readings_that_have_something_in_common_are_said_so(name, expected, told):
+    run = clean_run("hexapod", 5, poses=24, order="pose-by-pose")
+    rows = looked("hexapod", spoiled(MISTAKES[name], name, run))
+    (one,) = record_of(fit_effects(rows, []))
+    assert one.name == expected
+    assert told in one.says
 
 
 def test_the_moment_and_the_size_of_a_move_are_found():

@@ -1,0 +1,226 @@
+"""A geometry bent to fit a record: an actuator that slipped, a table in another frame, rounding.
+
+Each is tried against the fit as it stands by what freeing it would lower the cost by
+(:mod:`calib.look.scan`); it must explain most of what is too much, by itself.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib.arrays import Array, BoolArray
+from calib.effects import effect_named
+from calib.errors import BadInput
+from calib.identify.fitting import Fit
+from calib.identify.staged import fit_effects
+from calib.look.digits import decimals_of
+from calib.look.scan import excess, scan
+from calib.look.seats import ALONG, normal_of, radii_in_words
+from calib.mechanism.description import Machine
+from calib.mechanism.rigid import rotate
+from calib.runs.record import Run
+from calib.runs.remark import Remark, ranges
+from calib.runs.stack import stack
+
+FALL = 100.0
+"""Least fall of the cost by which such a hypothesis is held."""
+SLIP_SHARE, FRAME_SHARE = 0.7, 0.9
+"""Least part of what is too much that a slip, and a frame, must explain."""
+NOT_STATED = 40.0
+"""Fall of the cost by which the machine file's values must be better than those stated."""
+LOUD = 2.0
+"""Chi-square per degree of freedom up to which a fit is one of the whole record."""
+LEAST = 3
+"""Readings on either side of a step."""
+SMALLEST_MM = 0.3
+"""Offset of a whole table, mm, below which it is a matter of tolerances."""
+NEAR = 3.0
+"""Times by which the misfit may differ from what rounding predicts."""
+_Known = Mapping[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Slip:
+    """One actuator off from accepted reading ``row`` on: values of ``actuator-step``."""
+
+    row: int
+    actuator: int
+    values: Array
+    fall: float
+
+
+def slip(fitted: Fit) -> Slip | None:
+    """The one actuator whose step at one moment explains most of the misfit."""
+    rows, kept = fitted.model.rows, np.flatnonzero(fitted.accepted)
+    inner = slice(LEAST, kept.size - LEAST + 1)
+    best: Slip | None = None
+    for k in range(len(rows.machine.actuators)):
+        columns = fitted.linear.situation.actuator_columns[[k]][:, :, fitted.accepted]
+        tried = scan(fitted, columns)
+        if tried.fall[inner].size == 0:
+            return None
+        at = int(np.argmax(tried.fall[inner])) + LEAST
+        fall = float(tried.fall[at])
+        if best is None or fall > best.fall:
+            values = np.zeros(len(rows.machine.actuators) + 1)
+            values[k] = tried.sizes[at, 0]
+            values[-1] = 0.5 * (rows.time_s[kept[at - 1]] + rows.time_s[kept[at]])
+            best = Slip(int(kept[at]), k, values, fall)
+    if best is None or best.fall < max(FALL, SLIP_SHARE * excess(fitted)):
+        return None
+    late = fitted.model.rows.time_s >= best.values[-1]
+    return best if 0 < int(late.sum()) < late.size else None
+
+
+def slip_remark(fitted: Fit, found: Slip) -> Remark:
+    """What is said of a slip."""
+    rows = fitted.model.rows
+    axis = rows.machine.actuators[found.actuator]
+    size = float(found.values[found.actuator])
+    part = 100.0 * found.fall / max(excess(fitted), found.fall)
+    return Remark(
+        "actuator-slipped",
+        f"{axis.name} is off by {size:+.3g} {axis.unit} from line {rows.line[found.row]} on "
+        f"({rows.time_s[found.row]:.0f} s): it slipped, or lost counts",
+        ranges(rows.line[found.row :], rows.line),
+        f"One step of this actuator alone explains {part:.0f} % of the misfit",
+        "The step is in the model as actuator-step; nothing is excluded for it",
+        f"See {axis.name} and its drive, home it, and measure again from there on",
+        True,
+        rows.runs[0].source,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Mended:
+    """A run as it is meant, and what is said of it."""
+
+    run: Run
+    remark: Remark
+
+
+def table_frame(machine: Machine, run: Run, fitted: Fit) -> Mended | None:
+    """All nests of the platform, or of the base, off by one amount."""
+    rows = fitted.model.rows
+    best: tuple[float, bool, Array] | None = None
+    for platform in (True, False):
+        which = rows.on_platform == platform
+        if not which[fitted.accepted].any() or which[fitted.accepted].all():
+            continue
+        tried = scan(fitted, _columns(fitted, which, platform=platform))
+        if best is None or tried.fall[0] > best[0]:
+            best = (float(tried.fall[0]), platform, tried.sizes[0])
+    if best is None or best[0] < max(FALL, FRAME_SHARE * excess(fitted)):
+        return None
+    _, platform, offset = best
+    if np.linalg.norm(offset) < SMALLEST_MM:
+        return None
+    again = _fit(machine, _shifted(run, offset, platform=platform))
+    if again is not None:
+        which = again.model.rows.on_platform == platform
+        offset = offset + scan(again, _columns(again, which, platform=platform)).sizes[0]
+    return Mended(
+        _shifted(run, offset, platform=platform), _frame_remark(run, offset, platform=platform)
+    )
+
+
+def _columns(fitted: Fit, which: BoolArray, *, platform: bool) -> Array:
+    """Whitened columns (3, 3, A) of moving all nests of a table, in its frame."""
+    situation = fitted.linear.situation
+    unit = np.repeat(np.eye(3)[:, :, None], which.size, axis=2) * which
+    turned = np.stack([rotate(situation.rotation, one) for one in unit]) if platform else unit
+    whitened = np.einsum("ijn,kjn->kin", situation.whitened_frame, turned)
+    return np.asarray(whitened[:, :, fitted.accepted], dtype=np.float64)
+
+
+def _shifted(run: Run, offset: Array, *, platform: bool) -> Run:
+    header = run.header
+    table = header.platform_nests if platform else header.base_nests
+    moved = {nest: place + offset for nest, place in table.items()}
+    if platform:
+        return replace(run, header=replace(header, platform_nests=moved))
+    return replace(run, header=replace(header, base_nests=moved))
+
+
+def _frame_remark(run: Run, offset: Array, *, platform: bool) -> Remark:
+    table = "platform" if platform else "base"
+    size = float(np.linalg.norm(offset))
+    told = ", ".join(f"{value:+.3f}" for value in offset)
+    says = (
+        f"All nests of [nests.{table}] are off by {size:.3g} mm alike ({told} mm): they are given "
+        "from another origin"
+    )
+    along = abs(float(normal_of(run.header) @ offset)) if platform else abs(float(offset[2]))
+    if along > ALONG * size:
+        says += f", or read with SMRs of another size than the others{radii_in_words(along)}"
+    return Remark(
+        "nests-frame",
+        says,
+        (),
+        "No machine within its tolerances is so far off; with the table moved by that it is within "
+        "them",
+        "Fitted with the table moved by that",
+        f"Give [nests.{table}] in the frame of the machine file, SMR centres",
+        True,
+        run.source,
+    )
+
+
+def not_stated(machine: Machine, run: Run, fitted: Fit) -> Mended | None:
+    """Controller parameters that the readings contradict, and the nominal ones do not."""
+    if not run.header.controller_parameters or fitted.model.rows.known:
+        return None
+    nominal = replace(run, header=replace(run.header, controller_parameters={}))
+    again = _fit(machine, nominal)
+    if again is None:
+        return None
+    fall = excess(fitted) - excess(again)
+    if fall < NOT_STATED or again.chi2_per_dof > max(LOUD, fitted.chi2_per_dof):
+        return None
+    names = ", ".join(list(run.header.controller_parameters)[:4])
+    return Mended(
+        nominal,
+        Remark(
+            "controller-parameters",
+            f"The controller did not hold what [controller.parameters] states ({names} ...)",
+            (),
+            "With the machine file's own values the geometry is within its tolerances, with those "
+            f"stated it is not (the cost of the fit falls by {fall:.3g})",
+            "Fitted with the machine file's own values",
+            "State the parameters with which the controller moved while this run was measured",
+            True,
+            run.source,
+        ),
+    )
+
+
+def rounded_commands(run: Run, fitted: Fit) -> Remark | None:
+    """q with so few digits that rounding alone would make the misfit there is."""
+    rows = fitted.model.rows
+    on = rows.on_platform & fitted.accepted
+    step = 10.0 ** -decimals_of(rows.q[:, on])
+    columns = fitted.linear.situation.actuator_columns[:, :, on]
+    expected = 1.0 + float(np.sum(columns**2)) * step**2 / 12.0 / (3.0 * on.sum())
+    if expected < NEAR or not 1.0 / NEAR < fitted.chi2_per_dof / expected < NEAR:
+        return None
+    unit = rows.machine.actuators[0].unit
+    return Remark(
+        "q-rounded",
+        f"q1.. are rounded to {step:g} {unit}, and the readings scatter as much as that makes them",
+        (),
+        f"Rounding predicts a chi-square of {expected:.3g} per degree of freedom; it is "
+        f"{fitted.chi2_per_dof:.3g}",
+        "Taken as it stands; small effects cannot be told from the rounding",
+        "Write the commands with all their digits, as they were sent",
+        False,
+        run.source,
+    )
+
+
+def _fit(machine: Machine, run: Run, known: _Known | None = None) -> Fit | None:
+    try:
+        rows = replace(stack(machine, [run]), known=known or {})
+        return fit_effects(rows, [effect_named(name, machine) for name in rows.known])
+    except BadInput:
+        return None
