@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 
+from bench._blind_noise import noisy
 from mocks.hidden import effects, effects_of
 from mocks.hidden.effect import Site, Table
 from mocks.hidden.table import Hidden
@@ -14,6 +15,7 @@ from mocks.simulate.plan import Profile, RunPlan
 from mocks.simulate.run import SimulatedRun, simulate
 
 SIGMA_MM = 0.005
+NEXT_TO_NONE_MM = 1e-9
 POSE_SETS = ("designed 29", "random 29", "random 60", "random 100")
 PROFILE = Profile(rise_K=6.0, payload_kg=(0.0, 12.0, 0.0, 12.0, 0.0, 12.0))
 
@@ -28,6 +30,8 @@ class Case:
     poses: str
     unknown: bool = False
     machine: str = "hexapod"
+    noise: str = ""
+    """Condition of the noise (``_blind_noise.py``); empty: white, as stated."""
 
     @property
     def kind(self) -> str:
@@ -73,7 +77,11 @@ def build(case: Case, poses: object) -> tuple[SimulatedRun, Table]:
     hidden: Table = {}
     for name, size in zip(case.effects, case.sizes, strict=True):
         hidden |= _scaled(plan, empty, name, size, rng)
-    return simulate(replace(plan, hidden=Hidden(hidden))), hidden
+    run = simulate(replace(plan, hidden=Hidden(hidden)))
+    if case.noise:
+        quiet = simulate(replace(plan, hidden=Hidden(hidden), noise_mm=NEXT_TO_NONE_MM))
+        run = replace(run, xyz=noisy(quiet, case.noise, SIGMA_MM, case.seed))
+    return run, hidden
 
 
 def _scaled(

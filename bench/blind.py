@@ -1,6 +1,7 @@
 """Blind trial: hidden effects in simulated runs, found without seeing the truth, and scored.
 
     python -m bench blind [--cases 400] [--null 400] [--seed 1] [--page docs/blind-trial.md]
+    python -m bench blind --cases 60 --null 100 --noise ar:0.5    # walk:0.3, visit:1, t:5 ...
 
 The runs come from the mock's own physics (`mocks.simulate`), which imports neither the engine nor
 the effects. What is written to the page is measured by this command.
@@ -11,7 +12,7 @@ import os
 import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -103,7 +104,8 @@ def solve(case: Case) -> Outcome:
     last = stage_of(found)
     name, groups = named(found)
     after = None
-    if case.kind == "single" and case.sizes == (1.0,) and case.poses.startswith("designed"):
+    usual = case.kind == "single" and case.sizes == (1.0,) and not case.noise
+    if usual and case.poses.startswith("designed"):
         after = follow_up(found, simulated, hidden)
     return Outcome(
         case=case,
@@ -135,7 +137,7 @@ def _foreseen(
     case: Case, poses: object, hidden: dict[str, float], refit: Refitter
 ) -> tuple[Foreseen, ...]:
     """Every effect of a single or a pair, in the model that has the other."""
-    if len(case.effects) > 2:
+    if len(case.effects) > 2 or case.noise:
         return ()
     found = []
     for effect in case.effects:
@@ -169,10 +171,12 @@ def main() -> None:
     parser.add_argument("--machines", default="hexapod,tripod,ptm")
     parser.add_argument("--only", choices=("single", "several", "unknown"))
     parser.add_argument("--hide", help="effects that may be hidden, by comma; all by default")
+    parser.add_argument("--noise", default="", help="other noise than is stated: ar:0.5 ...")
     parser.add_argument("--page", type=Path)
     options = parser.parse_args()
     command = f"python -m bench blind --cases {options.cases} --null {options.null}"
     command += f" --hide {options.hide}" if options.hide else ""
+    command += f" --noise {options.noise}" if options.noise else ""
     allowed = options.hide.split(",") if options.hide else None
     text = f"# Blind trial\n\nWritten by `{command} --seed {options.seed}`.\n{INTRODUCTION}"
     for machine in options.machines.split(","):
@@ -183,7 +187,8 @@ def main() -> None:
             if options.only is None or options.only == case.kind
         ]
         nulls = draw_nulls(options.null, options.seed, machine)
-        outcomes = run_all([*cases, *nulls], options.workers)
+        asked = [replace(case, noise=options.noise) for case in (*cases, *nulls)]
+        outcomes = run_all(asked, options.workers)
         text += "\n" + page(outcomes, machine, time.perf_counter() - begin)
     print(text)
     if options.page is not None:

@@ -13,7 +13,7 @@ from app.files.staircase import Way
 from app.jobs.chosen_runs import File, Runs, names_of, path_of
 from app.jobs.record import Record, Report
 from app.jobs.remembering import remember_fit
-from calib.discover.agreement import runs_at_odds
+from calib.discover.agreement import runs_at_odds, successive_alike
 from calib.identify import Fit, fit_report
 from calib.identify.staged import fit_effects
 from calib.look.judged import record_of
@@ -181,7 +181,7 @@ def fit(runs: Runs, *, add: Sequence[str] = (), model: File | None = None) -> Fi
         **fit_report(found),
         "settled": found.settled,
         "steps": found.steps,
-        "remarks": [f"{odds}."] if odds else [],
+        "remarks": [f"{one}." for one in (odds, successive_alike(found)) if one],
         "record": plain_remarks(record_of(found)),
     }
     return FitReport.of(said, _fit=found, _runs=names)

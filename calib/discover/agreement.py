@@ -22,6 +22,10 @@ TOGETHER_WORSE = 1.5
 """Chi-square per degree of freedom together, over that apart, from which runs are at odds."""
 LOOSE = 1e-3
 """p-value below which base nests are not read as well as they should be."""
+FEW_PAIRS = 10
+"""Pairs of readings below which nothing is said of their likeness."""
+SURELY = 4.5
+"""Standard deviations of a correlation that is no chance (3e-6)."""
 TOO_SMALL, TOO_LARGE = 1.3, 0.7
 """Scatter in stated uncertainties beyond which these are called untrue."""
 
@@ -84,6 +88,24 @@ def loose_references(fitted: Fit) -> str:
     return (
         f"But base nests scatter {math.sqrt(found.variance):.2g} times as much from reading to "
         f"reading as sx, sy, sz say (p = {found.p_value:.1g}): look for a loose one"
+    )
+
+
+def successive_alike(fitted: Fit) -> str:
+    """Say if readings that follow each other err alike, while they are taken as independent."""
+    rows, kept = fitted.model.rows, fitted.accepted
+    residual, run = fitted.linear.whitened[:, kept], rows.run[kept]
+    pair = np.flatnonzero(run[1:] == run[:-1])
+    if fitted.whitening is not None or pair.size < FEW_PAIRS:
+        return ""
+    first, second = residual[:, pair], residual[:, pair + 1]
+    scale = math.sqrt(float(np.sum(first**2)) * float(np.sum(second**2)))
+    alike = float(np.sum(first * second)) / scale if scale > 0.0 else 0.0
+    if alike * math.sqrt(first.size) < SURELY:
+        return ""
+    return (
+        f"Successive readings err alike ({alike:.2f} between two): noise that lasts, or an effect "
+        "that is missing. The uncertainties take them as independent; pkmcal diagnose tells which"
     )
 
 

@@ -12,6 +12,9 @@ from calib.mechanism.traits import Part, Traits
 from calib.runs.stack import Rows
 from calib.unknown import Unknown
 
+TOLERANCE_MM = 0.2
+"""Standard deviation of a difference; it alone holds what all limbs share, which moves nothing."""
+
 
 class ParallelogramSides(Effect):
     """Difference of the two long sides, one for each limb."""
@@ -33,7 +36,8 @@ class ParallelogramSides(Effect):
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``parallelogram-sides.limb1`` ..., mm: side 1 less side 2."""
         return tuple(
-            Unknown(f"parallelogram-sides.{name}", "mm", 0.05) for name in _limbs(rows.machine)
+            Unknown(f"parallelogram-sides.{name}", "mm", 0.05, sigma=TOLERANCE_MM)
+            for name in _limbs(rows.machine)
         )
 
     def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
