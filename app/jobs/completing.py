@@ -96,10 +96,15 @@ def complete(machine: str | Path, *, tool: bool = False) -> CompletionReport:
     --------
     >>> pkmcal.complete("my-arm.toml").proposal                              # doctest: +SKIP
     """
-    described_machine = load_machine(str(machine))
-    text = _text_of(str(machine))
+    found = load_machine(str(machine))
+    return completed(_text_of(str(machine)), found, _usual(found), tool=tool)
+
+
+def completed(
+    text: str, described_machine: Machine, usual: dict[str, float], *, tool: bool
+) -> CompletionReport:
+    """Complete the text of a machine file; ``usual`` tolerances by unit, mm and rad."""
     errors = errors_of(tomllib.loads(text))
-    usual = _usual(described_machine)
     written = {unit: f"{value!r}" for unit, value in usual.items()}
     every = parse_machine(_bare(with_errors(text, errors, written, "")), described_machine.source)
     found = _found(described_machine, every, errors)
@@ -169,7 +174,7 @@ def _found(machine: Machine, every: Machine, errors: Sequence[Error]) -> Lacking
     columns = twists.reshape(len(twists), -1)
     frame = frame_columns(here.poses)
     frame[:, 3:] *= machine.size
-    known = columns[[every.index(p.name) for p in machine.parameters]]
+    known = columns[np.array([every.index(p.name) for p in machine.parameters], dtype=np.intp)]
     candidates = [columns[_members(every, one)] for one in errors]
     places = [one.element[0] == "t" for one in errors]
     return lacking(known, frame.reshape(6, -1), candidates, places, LEAST)

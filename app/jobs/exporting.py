@@ -5,7 +5,7 @@ import math
 import re
 import traceback
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from app.files.fits import SavedFit, read_fit
 from app.files.text import read_text
 from app.hosted.parameters import effect_of
 from app.jobs.corrector import machine_of
+from app.jobs.urdf import urdf_of
 from calib.command.identified import commandable
 from calib.effects.struts import struts_of
 from calib.errors import BadInput
@@ -27,7 +28,7 @@ from drivers.kind import Strut
 from drivers.linuxcnc.places import Places
 
 SHIPPED = ("csv", "gcode-delta", "hal", "p-variables")
-PLAIN = ("json", "toml")
+PLAIN = ("json", "toml", "urdf")
 FORMAT = "pkm-export/1"
 LONGEST_TEMPLATE = 100_000
 
@@ -57,6 +58,8 @@ class Corrected:
     parameters: tuple[Number, ...]
     effects: tuple[Number, ...]
     left_out: tuple[str, ...]
+    controller: Mapping[str, float] = field(default_factory=dict)
+    """The controller's own parameters: its coordinates refer to them."""
 
     @property
     def values(self) -> dict[str, float]:
@@ -91,7 +94,7 @@ def corrected(model: Path, machine: str | None = None) -> Corrected:
             continue
         names = [name for name in fit.estimates if name.startswith(f"{identifier}.")]
         effects += [_number(fit, name, used.get(name, 0.0)) for name in names]
-    return Corrected(described, str(model), own, tuple(effects), tuple(left_out))
+    return Corrected(described, str(model), own, tuple(effects), tuple(left_out), fit.controller)
 
 
 def _number(fit: SavedFit, name: str, beside: float) -> Number:
@@ -114,6 +117,13 @@ def export(model: Path, form: str, machine: str | None = None) -> str:
         For a model that does not suit, or a template with a fault; with its line.
     """
     found = corrected(model, machine)
+    if form == "urdf":
+        return urdf_of(
+            found.machine,
+            {one.name: one.value for one in found.parameters},
+            found.controller,
+            _says(found),
+        )
     if form in PLAIN:
         table = {
             "format": FORMAT,
@@ -135,6 +145,16 @@ def export(model: Path, form: str, machine: str | None = None) -> str:
             remedy=f"Write one of {', '.join((*PLAIN, *SHIPPED))}, or a template's path (.j2)",
         )
     return rendered(read_text(path), found, form)
+
+
+def _says(found: Corrected) -> str:
+    """What stands at the head of a URDF: where it is from, and what it does not hold."""
+    lacks = [*dict.fromkeys(one.group for one in found.effects), *found.left_out]
+    beyond = f" Not in it, as URDF is geometry alone: {', '.join(lacks)}." if lacks else ""
+    return (
+        f"{found.machine.name} as calibrated, from {found.source}. Lengths in m, angles in rad. "
+        f"Efforts and velocities are not known here and stand as 0.{beyond}"
+    )
 
 
 def rendered(template: str, found: Corrected, place: str) -> str:

@@ -11,6 +11,7 @@ from app import answer
 from app.analysis_options import chosen_machine, machine_options
 from app.files.machines import load_machine
 from app.jobs.completing import complete as completed
+from app.jobs.urdf import machine_of_urdf
 from app.machine_templates import TEMPLATES
 from app.show.braille import plain
 from app.show.completion_words import completion_words
@@ -120,6 +121,53 @@ def complete(machine_name: str, tool: bool, out: Path | None, as_json: bool) -> 
         out.write_text(found.text, encoding="utf-8", newline="\n")
         answer.say(f"written to {out}")
     answer.show(found.to_json(), as_json, completion_words(found.to_json()))
+
+
+@command.command(name="import")
+@click.argument("file", type=click.Path(path_type=Path, dir_okay=False), metavar="ARM.urdf")
+@click.option("--out", type=answer.WrittenFile(), required=True, help="Machine file to write.")
+@click.option("--name", default="", help="Name of the machine.  [default: the robot's]")
+@click.option("--base", default="", help="Link to begin with.  [default: the root]")
+@click.option("--tip", default="", help="Link to end with.  [default: the only end]")
+@click.option("--tolerance", default="0.5 mm", show_default=True, help="Of errors of place.")
+@click.option("--angle", default="0.2 deg", show_default=True, help="Of errors of direction.")
+@click.option("--tool", is_flag=True, help="Errors of the nests on the flange as well.")
+@click.option("--force", is_flag=True, help="Overwrite the file.")
+def import_(
+    file: Path,
+    out: Path,
+    name: str,
+    base: str,
+    tip: str,
+    tolerance: str,
+    angle: str,
+    tool: bool,
+    force: bool,
+) -> None:
+    """Make a machine file of the serial chain that a URDF describes.
+
+    Joints become q1, q2, ... in their order, fixed joints are part of the links, joints that mimic
+    others follow them. The errors that a calibration can see are put in by rank, as pkmcal machine
+    complete does; home is a pose far from singular ones. xacro files are expanded first.
+    """
+    if out.exists() and not force:
+        raise BadInput("there is such a file already", place=str(out), remedy="Add --force.")
+    text = machine_of_urdf(
+        file,
+        name=name,
+        base=base,
+        tip=tip,
+        tolerance_mm=quantity(tolerance, "mm", "--tolerance"),
+        tolerance_rad=quantity(angle, "rad", "--angle"),
+        tool=tool,
+    )
+    out.write_text(text, encoding="utf-8", newline="\n")
+    machine = load_machine(str(out))
+    answer.say(f"written to {out}")
+    click.echo(
+        f"{machine.name}: {len(machine.actuators)} actuators, {len(machine.parameters)} parameters."
+        f"\nNext: pkmcal machine draw {out}; pkmcal machine check {out}"
+    )
 
 
 @command.command()
