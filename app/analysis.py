@@ -3,10 +3,13 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from app.files.models import chosen_effects, offered_effects
 from app.files.runs import read_runs
 from calib.discover.discovery import Refitter
 from calib.effects import Effect, catalogue, effect_named
+from calib.errors import BadInput
 from calib.look import first_look
 from calib.runs.stack import Rows, stack
 
@@ -34,22 +37,56 @@ def read_rows(runs: tuple[str, ...]) -> Rows:
     return stack(loaded[0].machine, [one.run for one in loaded])
 
 
+def masked_rows(rows: Rows, lines: Sequence[str]) -> tuple[int, ...]:
+    """Readings (indices into ``rows``) that the operator masks, by their lines.
+
+    A line is ``118``, or of several runs ``run:118`` with the run's folder.
+
+    Raises
+    ------
+    BadInput
+        Where no reading stands in such a line.
+    """
+    found: list[int] = []
+    for text in lines:
+        folder, _, line = text.rpartition(":")
+        if not line.isdigit() or (not folder and len(rows.runs) > 1):
+            remedy = "Write RUN:LINE" if len(rows.runs) > 1 else "Write the number of a line"
+            raise BadInput(f"--mask {text} names no line of points.csv", remedy=remedy)
+        numbers = [
+            number
+            for number, run in enumerate(rows.runs)
+            if not folder or Path(run.source).parent == Path(folder)
+        ]
+        here = np.isin(rows.run, numbers) & (rows.line == int(line))
+        if not here.any():
+            raise BadInput(
+                f"no reading stands in line {line}",
+                place=folder or rows.runs[0].source,
+                remedy="Lines count from 1, the header's",
+            )
+        found += [int(row) for row in np.flatnonzero(here)]
+    return tuple(found)
+
+
 def load_refitter(
     runs: tuple[str, ...],
     add: tuple[str, ...] = (),
     model: Path | None = None,
     watch: Callable[[tuple[str, ...]], None] | None = None,
     offer: Sequence[Path] = (),
+    mask: Sequence[str] = (),
 ) -> tuple[Refitter, tuple[str, ...]]:
     """Make runs ready for diagnosis: a refitter over the catalogue, and the effects to begin with.
 
     ``offer`` are effect files that are candidates beside the catalogue; ``watch`` is told the
-    effects of every model that is looked at.
+    effects of every model that is looked at; ``mask`` are lines as :func:`masked_rows` takes them.
     """
     rows, effects = load_rows(runs, add, model)
     candidates = (*catalogue(rows.machine), *offered_effects(offer, effects), *effects)
     known = {effect.id: effect for effect in candidates}
-    refit = Refitter(rows, tuple(known.values()), watch=watch)
+    masked = masked_rows(rows, mask)
+    refit = Refitter(rows, tuple(known.values()), masked=masked, watch=watch)
     return refit, tuple(effect.id for effect in effects)
 
 

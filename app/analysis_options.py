@@ -75,6 +75,17 @@ def written_residuals(found: Residuals, path: Path | None) -> None:
         answer.say(f"residuals written to {path}")
 
 
+def mask_option(function: _Function) -> _Function:
+    """Give a verb ``--mask LINE`` (repeatable)."""
+    return click.option(
+        "--mask",
+        multiple=True,
+        metavar="LINE",
+        help="Leave the reading in this line of points.csv out; every answer says so. Of several "
+        "runs RUN:LINE (repeatable).",
+    )(function)
+
+
 def watcher() -> Callable[[tuple[str, ...]], None] | None:
     """Tells every model that is looked at on standard error, on a terminal."""
     return _tell if answer.interactive() else None

@@ -29,6 +29,11 @@ def paths_of(files: Sequence[File]) -> tuple[Path, ...]:
     return tuple(Path(file) for file in files)
 
 
+def lines_of(mask: Sequence[int | str]) -> tuple[str, ...]:
+    """Lines of readings that are masked, as text."""
+    return tuple(str(line) for line in mask)
+
+
 def at_least(least: int, **given: int) -> None:
     """Refuse numbers that are too small; raises BadInput naming the argument."""
     for name, value in given.items():

@@ -8,7 +8,7 @@ from typing import ClassVar
 from app.analysis import asked_for, load_refitter
 from app.files.residuals import residuals_of_fit
 from app.files.staircase import way_of_discovery
-from app.jobs.chosen_runs import File, Runs, names_of, path_of, paths_of
+from app.jobs.chosen_runs import File, Runs, lines_of, names_of, path_of, paths_of
 from app.jobs.fitting import BadReadingEntry, RemarkEntry, keep_model
 from app.jobs.record import Record, Report
 from app.jobs.remembering import remember_fit
@@ -228,6 +228,7 @@ def diagnose(
     add: Sequence[str] = (),
     model: File | None = None,
     offer: Sequence[File] = (),
+    mask: Sequence[int | str] = (),
     watch: Watch | None = None,
 ) -> DiagnosisReport:
     """Score every known effect against what the fit leaves: which one is missing?
@@ -238,6 +239,8 @@ def diagnose(
         As for :func:`fit`.
     offer : sequence of paths, optional
         Effect files (docs/own-effects.md) that are candidates beside the catalogue.
+    mask : sequence of int or str, optional
+        As for :func:`fit`.
     watch : callable, optional
         Told the effects of each model that is fitted.
 
@@ -257,7 +260,9 @@ def diagnose(
     (False, 'backlash')
     """
     names = names_of(runs)
-    refit, begin = load_refitter(names, tuple(add), path_of(model), watch, paths_of(offer))
+    refit, begin = load_refitter(
+        names, tuple(add), path_of(model), watch, paths_of(offer), lines_of(mask)
+    )
     found = refit(begin).run
     return DiagnosisReport.of(diagnosis_report(found), _fit=found.fit, _runs=names)
 
@@ -268,6 +273,7 @@ def discover(
     add: Sequence[str] = (),
     model: File | None = None,
     offer: Sequence[File] = (),
+    mask: Sequence[int | str] = (),
     watch: Watch | None = None,
 ) -> DiscoveryReport:
     """Add the best effect, fit again, and go on until nothing more is called for.
@@ -280,6 +286,8 @@ def discover(
         As for :func:`fit`; these effects stay in.
     offer : sequence of paths, optional
         Effect files that are candidates beside the catalogue.
+    mask : sequence of int or str, optional
+        As for :func:`fit`.
     watch : callable, optional
         Told the effects of each model that is looked at.
 
@@ -300,7 +308,9 @@ def discover(
     >>> found.save("model.toml")                                             # doctest: +SKIP
     """
     names = names_of(runs)
-    refit, begin = load_refitter(names, tuple(add), path_of(model), watch, paths_of(offer))
+    refit, begin = load_refitter(
+        names, tuple(add), path_of(model), watch, paths_of(offer), lines_of(mask)
+    )
     found = discover_run(refit, asked_for(refit, begin, add))
     remember_fit(stage_of(found).run.fit, names)
     return DiscoveryReport.of(discovery_report(found), _found=found, _runs=names)

@@ -5,12 +5,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
 
-from app.analysis import load_rows
+from app.analysis import load_rows, masked_rows
 from app.files.models import write_model
 from app.files.residuals import residuals_of_fit
 from app.files.runs import outside_runs
 from app.files.staircase import Way
-from app.jobs.chosen_runs import File, Runs, names_of, path_of
+from app.jobs.chosen_runs import File, Runs, lines_of, names_of, path_of
 from app.jobs.record import Record, Report
 from app.jobs.remembering import remember_fit
 from calib.discover.agreement import runs_at_odds, successive_alike
@@ -144,7 +144,13 @@ class FitReport(Report):
         residuals_of_fit(Path(file), self._fit, self._runs)
 
 
-def fit(runs: Runs, *, add: Sequence[str] = (), model: File | None = None) -> FitReport:
+def fit(
+    runs: Runs,
+    *,
+    add: Sequence[str] = (),
+    model: File | None = None,
+    mask: Sequence[int | str] = (),
+) -> FitReport:
     """Fit geometry, the tracker's place and the chosen effects to one or several runs.
 
     Parameters
@@ -155,6 +161,9 @@ def fit(runs: Runs, *, add: Sequence[str] = (), model: File | None = None) -> Fi
         Effects in the model: names, or effect files that end in ``.toml``.
     model : path, optional
         A saved model to begin with.
+    mask : sequence of int or str, optional
+        Lines of ``points.csv`` that are left out, and said in ``bad_readings``; of several runs
+        ``"run:118"``.
 
     Returns
     -------
@@ -174,7 +183,7 @@ def fit(runs: Runs, *, add: Sequence[str] = (), model: File | None = None) -> Fi
     """
     names = names_of(runs)
     rows, effects = load_rows(names, tuple(add), path_of(model))
-    found = fit_effects(rows, effects)
+    found = fit_effects(rows, effects, masked_rows(rows, lines_of(mask)))
     remember_fit(found, names)
     odds = runs_at_odds(found)
     said = {

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.analysis import load_rows
+from app.analysis import load_rows, masked_rows
 from app.files.fits import read_fit
 from app.files.site import Site
 from app.files.staircase import Way
@@ -42,6 +42,8 @@ class Asked:
     ----------
     add, model
         Effects in the model, as for ``pkmcal fit``; a model file also tells how it was found.
+    mask : tuple of str
+        Lines of readings that are left out, as for ``pkmcal fit``.
     before, after : Path, optional
         What ``verify --save`` kept, or the folder of a verification.
     site : Site, optional
@@ -53,6 +55,7 @@ class Asked:
 
     add: tuple[str, ...] = ()
     model: Path | None = None
+    mask: tuple[str, ...] = ()
     before: Path | None = None
     after: Path | None = None
     site: Site | None = None
@@ -92,7 +95,7 @@ def write_report(runs: tuple[str, ...], asked: Asked, outs: Sequence[Path]) -> N
 def record_of_runs(runs: tuple[str, ...], asked: Asked) -> tuple[Page, Site | None]:
     """Fit the runs once more and make the record, with the site whose people it names."""
     rows, effects = load_rows(runs, asked.add, asked.model)
-    found = fit_effects(rows, effects)
+    found = fit_effects(rows, effects, masked_rows(rows, asked.mask))
     sources = _sources(runs, asked, found)
     way = read_fit(asked.model).way if asked.model is not None else Way()
     now = datetime.now(UTC)

@@ -98,3 +98,35 @@ def happenings(folder: Path) -> list[Happening]:
 def _step_words(says: str, result: Mapping[str, Any]) -> str:
     why = result.get("what") or result.get("why") or ""
     return f"{says}: {why}" if why else says
+
+
+class Following:
+    """A session as another process goes on with it; nothing is written.
+
+    Parameters
+    ----------
+    folder : Path
+        The session's folder.
+
+    Raises
+    ------
+    BadInput
+        If there is no session.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._told = 0
+        happenings(folder)
+
+    @property
+    def facts(self) -> SessionFacts:
+        """How far it has come by now."""
+        return facts_of(self.folder)
+
+    def news(self) -> list[Happening]:
+        """What has happened since this was asked the last time."""
+        found = happenings(self.folder)
+        fresh = found[self._told :]
+        self._told = len(found)
+        return fresh

@@ -6,7 +6,7 @@ from app import answer
 
 
 def verdict(found: dict[str, Any]) -> str:
-    """The table of a verification, with the earlier one and the paper's beside it."""
+    """The table of a verification, with the earlier one beside it."""
     rows: list[tuple[str, ...]] = []
     views = [("measured", "measured"), *([("truth", "true")] if found["truth"] else [])]
     for when, data in (("before", found["before"]), ("now", found)):
@@ -21,8 +21,10 @@ def verdict(found: dict[str, Any]) -> str:
             for key, name in views
             if data and data.get(key)
         ]
-    noise, paper = found["noise_alone"], found["paper"]
-    for name, data in (("tracker noise alone", noise), ("Han et al. 2020, after", paper)):
+    peaks = [("tracker noise alone", found["noise_alone"])]
+    if found["truth"]:  # a mock: beside it what was published of such a machine
+        peaks.append(("Han et al. 2020, after", found["paper"]))
+    for name, data in peaks:
         rows.append(
             (name, f"{data['position_peak_um']:.1f}", "", f"{data['orientation_peak_deg']:.4f}", "")
         )

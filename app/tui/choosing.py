@@ -4,9 +4,11 @@ import shlex
 from collections.abc import Callable
 from pathlib import Path
 
+from app.session.listing import facts_of
 from app.tui.dialogs import Enter, Pick
 from app.tui.face import Face
 from app.tui.shelf import runs_under
+from app.tui.starting import session_words
 
 
 def choose_runs(face: Face, then: Callable[[], None]) -> None:
@@ -30,7 +32,7 @@ def choose_runs(face: Face, then: Callable[[], None]) -> None:
         elif answer == "":
             type_folders()
 
-    found = [(str(folder), folder.parent.name) for folder in runs_under(face.desk.root)]
+    found = [(str(run), session_words(facts_of(run.parent))) for run in runs_under(face.desk.root)]
     if found:
         options = [*found, ("", "other runs: type their folders")]
         face.app.push_screen(Pick("Run", "Runs of sessions, newest first", options), picked)

@@ -55,7 +55,7 @@ class Corrections:
     async def compare(self) -> None:
         """Read the controller and judge the fit on the Fit screen; nothing is written."""
         station = self._desk.idle_station("compare")
-        model = self._model_file()
+        model = self.model_file()
         controller = station.controller
         held = await compare_with_known(station.site, controller)
         told = await controller.frame() if isinstance(controller, HostedController) else {}
@@ -73,7 +73,7 @@ class Corrections:
             self._desk.picture.tell(gate)
         self.list_snapshots(station)
 
-    def _model_file(self) -> Path:
+    def model_file(self) -> Path:
         """Write the fit down: what is applied must be there to be read later."""
         answer = self._desk.study.answer
         if answer is None:
@@ -84,7 +84,7 @@ class Corrections:
         model.parent.mkdir(parents=True, exist_ok=True)
         from app.files.models import write_model  # brings scipy's statistics: not at start
 
-        write_model(model, answer.fit)
+        write_model(model, answer.fit, self._desk.study.way())
         return model
 
     async def apply(self) -> None:
@@ -104,6 +104,8 @@ class Corrections:
             raise
         else:
             self._desk.picture.run = "finished"
+            self._desk.done.add("applied")
+            self._desk.done -= {"left", "record"}
         finally:
             self.running = None
             self.comparison = None

@@ -8,6 +8,7 @@ import asyncio
 import contextlib
 import json
 from collections.abc import Coroutine, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -55,6 +56,8 @@ class Desk:
         self.study = Study(root, self.picture)
         self.before: Verified | None = None
         self.after: Verified | None = None
+        self.done: set[str] = set()
+        """What was done with the open site: ``found``, ``applied``, ``left``, ``record``."""
 
     # site and mock
 
@@ -67,6 +70,7 @@ class Desk:
         self._not_while_busy("change the site")
         await self.disconnect()
         self.site = site
+        self.done.clear()
         self.study.offers = site.offers
         self.station = Station(site)
         self.station.observers.watch(self._hear)
@@ -270,6 +274,8 @@ class Desk:
         if self.after is not None:
             self.before = self.after
         self.after = judged
+        self.done.add("left" if "applied" in self.done else "found")
+        self.done.discard("record")
         found = judged.found.measured
         self.picture.write(
             f"verified {len(judged.found.labels)} poses: peak {found.position_peak_um:.1f} um, "
@@ -281,6 +287,25 @@ class Desk:
         """Let an earlier verification stand as 'before'."""
         self.before = await asyncio.to_thread(verified, folder)
         self.picture.write(f"before: {folder.name}")
+
+    async def write_record(self, outs: Sequence[Path]) -> None:
+        """Write the calibration record of the runs that are studied, beside the other steps."""
+        model = self.corrections.model_file()
+        runs = self.study.runs
+        from app.report.build import Asked, write_report  # brings matplotlib: not at start
+
+        asked = Asked(
+            model=model,
+            before=self.before.folder if self.before is not None else None,
+            after=self.after.folder if self.after is not None else None,
+            site=self.site,
+        )
+        if asked.before is None and "applied" not in self.done:
+            asked = replace(asked, before=asked.after, after=None)
+
+        await asyncio.to_thread(write_report, runs, asked, outs)
+        self.done.add("record")
+        self.picture.write(f"calibration record in {' and '.join(map(str, outs))}", "good")
 
     # the operator's keys
 

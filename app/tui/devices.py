@@ -11,11 +11,17 @@ from textual.widgets import Static
 
 from app.files.site import Site
 from app.session.events import Connected
+from app.session.listing import SessionFacts, sessions_under
 from app.tui.dialogs import Choose, Enter, Pick, site_candidates
 from app.tui.face import Face
+from app.tui.next_step import job_steps
 from app.tui.picture import Picture
+from app.tui.starting import MYSTERY, start_text
 from app.tui.wording import channel_text
 from drivers.interface import ActuatorState, ControllerState, TrackerState
+
+RECENT = 3
+"""Sessions on the empty screen."""
 
 
 class DevicesFace(Face):
@@ -33,8 +39,13 @@ class DevicesFace(Face):
         Binding("m", "mock", "Mock", tooltip="Start a mock machine with its tracker"),
         Binding("c", "connect", "Connect", tooltip="Connect to the devices, or let them go"),
         Binding("e", "power", "Drives", tooltip="Switch the drives' power"),
+        Binding("t", "try", "Try", tooltip="Look at the mystery run: what is wrong with it?"),
         Binding("f", "clear_faults", "Clear faults", tooltip="Reset standing drive faults"),
     ]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._recent: list[SessionFacts] | None = None
 
     def body(self) -> ComposeResult:
         """Site, controller and tracker; alarms beside or below them."""
@@ -57,7 +68,7 @@ class DevicesFace(Face):
     def show(self, picture: Picture) -> None:
         """Draw all panels."""
         states, links = picture.states, picture.connected
-        self._put("site", site_text(self.desk.site, self.desk.mock is not None))
+        self._put("site", self._site_text())
         self._put(
             "controller",
             controller_text(links.get("controller"), states.controller if states else None),
@@ -67,6 +78,13 @@ class DevicesFace(Face):
         for role in ("controller", "tracker"):
             link = links.get(role)
             self.query_one(f"#dev-{role}").border_subtitle = link.address if link else ""
+
+    def _site_text(self) -> Content:
+        if self.desk.site is not None:
+            return site_text(self.desk.site, self.desk.mock is not None)
+        if self._recent is None:
+            self._recent = sessions_under(self.desk.root, RECENT)
+        return start_text(job_steps(self.desk), self._recent)
 
     def _put(self, panel: str, text: Content) -> None:
         self.query_one(f"#dev-{panel}", Static).update(text)
@@ -117,6 +135,16 @@ class DevicesFace(Face):
         else:
             self.act(self.desk.connect, busy="connecting ...")
 
+    async def action_try(self) -> None:
+        """Ask what the model of the tutorial's run misses, on the Discover screen."""
+        if not MYSTERY.is_dir():
+            self.notify("The mystery run comes with a clone of the program, not with this package.")
+            return
+        study = self.desk.study
+        study.choose((str(MYSTERY),))
+        self.act(study.diagnose, busy="asking what is missing ...")
+        await self.bench.switch_mode("discover")
+
     def action_clear_faults(self) -> None:
         """Reset drive faults."""
         self.act(self.desk.clear_faults)
@@ -139,13 +167,8 @@ class DevicesFace(Face):
         )  # fmt: skip
 
 
-def site_text(site: Site | None, mock: bool) -> Content:
+def site_text(site: Site, mock: bool) -> Content:
     """Say which site is open."""
-    if site is None:
-        return Content.from_markup(
-            "No site is open.  [bold $accent]o[/] opens a site file,  "
-            "[bold $accent]m[/] starts a mock machine."
-        )
     who = "the mock" if site.hands.kind == "mock" else "you"
     smrs = "one SMR" if site.hands.smrs == 1 else f"{site.hands.smrs} SMRs"
     own = "  (started by this program)" if mock else ""

@@ -8,6 +8,7 @@ from textual.screen import Screen
 from textual.widgets import Footer
 
 from app.tui.desk import Desk
+from app.tui.next_step import NextLine
 from app.tui.picture import Picture
 from app.tui.widgets.frame import Banner, TabLine, TopLine
 
@@ -53,6 +54,7 @@ class Face(Screen[None]):
         """The frame around the body."""
         yield TopLine(id="top")
         yield TabLine(self.bench.tabs, self.mode)
+        yield NextLine("", id="next")
         yield from self.body()
         yield Banner(id="banner")
         yield Footer(show_command_palette=False, compact=True)
@@ -81,6 +83,7 @@ class Face(Screen[None]):
         site = self.desk.site
         name = (site.title or site.machine.name) if site is not None else "no site open"
         self.query_one("#top", TopLine).show(picture, name, self.desk.connected)
+        self.query_one("#next", NextLine).show(self.desk)
         self.query_one("#banner", Banner).show(picture)
         self.show(picture)
 

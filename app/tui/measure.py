@@ -12,11 +12,13 @@ from textual.content import Content
 from textual.widgets import Static
 
 from app.files.site import Site
+from app.session.listing import facts_of
 from app.tui.dialogs import Pick
 from app.tui.face import Face
 from app.tui.picture import Picture
 from app.tui.planning import NewRun, RunWish, plan_for
 from app.tui.shelf import unfinished
+from app.tui.starting import session_words
 from app.tui.widgets.plots import MissPlot, ScatterPlot
 from app.tui.widgets.steplist import StepList
 from calib.digits import plus_minus
@@ -118,7 +120,7 @@ class MeasureFace(Face):
             if answer:
                 self.act(lambda: self.desk.go_on(Path(answer)))
 
-        options = [(str(folder), folder.name) for folder in folders]
+        options = [(str(folder), session_words(facts_of(folder))) for folder in folders]
         self.app.push_screen(Pick("Go on with", "Sessions, newest first", options), picked)
 
 

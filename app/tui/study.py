@@ -4,11 +4,13 @@ What needs the statistics of scipy is imported when it is used: the screens open
 """
 
 import asyncio
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeVar
 
 from app.errors import GateRefused
+from app.files.staircase import StairStep, Way
 from app.tui.picture import Picture
 from app.tui.shelf import runs_under
 from calib.errors import BadInput
@@ -86,10 +88,15 @@ class Study:
         runs = self._chosen()
         effects, offers = self.effects, self.offers
 
+        before = self.search.stairs if self.search is not None else []
+
         def work() -> "Search":
             from app.tui.discovering import Search
 
-            return Search.of(runs, effects, offers)
+            found = Search.of(runs, effects, offers)
+            if before:  # asked again: the way so far stands
+                found.stairs[:] = [*before, *(s for s in found.stairs[1:] if s not in before)]
+            return found
 
         self.search = await self._think(work)
         self._tell_stair(self.search)
@@ -121,11 +128,31 @@ class Study:
             f"{stair.did}: RMS {stair.rms_um:.2f} um, floor {stair.floor_um:.2f}", "good"
         )
 
+    def way(self) -> Way:
+        """How the model was found, for its file."""
+        if self.search is None:
+            return Way()
+        steps = [
+            StairStep(
+                did=stair.did, chi2_per_dof=stair.chi2_per_dof, rms_um=stair.rms_um,
+                noise_floor_um=stair.floor_um, holdout_rms_um=_known(stair.holdout_um),
+                holdout_floor_um=_known(stair.holdout_floor_um),
+            )
+            for stair in self.search.stairs
+        ]  # fmt: skip
+        view = self.search.view
+        groups = () if view is None else view.diagnosis["indistinguishable"]
+        return Way(tuple(steps), tuple(tuple(group) for group in groups))
+
     async def save(self, path: Path) -> None:
         """Write the fitted model to a file."""
         if self.answer is None:
             raise BadInput("nothing is fitted yet", remedy="Fit a run first")
         from app.files.models import write_model
 
-        write_model(path, self.answer.fit)
+        write_model(path, self.answer.fit, self.way())
         self._picture.write(f"model written to {path}", "good")
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -11,13 +11,16 @@ from textual.containers import Horizontal, Vertical
 from textual.content import Content
 from textual.widgets import DataTable, Static
 
-from app.tui.dialogs import Choose, Pick
+from app.session.listing import facts_of
+from app.tui.dialogs import Choose, Enter, Pick
 from app.tui.face import Face
 from app.tui.picture import Picture
 from app.tui.shelf import finished_verifications
+from app.tui.starting import session_words
 from app.tui.verifying import Verified
-from app.tui.widgets.plots import PairPlot
+from app.tui.widgets.plots import LogPairPlot
 from app.verification import PAPER
+from calib.arrays import Array
 from calib.pose_error import Summary
 
 ALL, QUICK = "all poses", "quick: one in eight"
@@ -38,6 +41,7 @@ class VerifyFace(Face):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("v", "verify", "Verify", tooltip="Measure the verification poses"),
         Binding("o", "before", "Choose before", tooltip="Choose an earlier verification"),
+        Binding("p", "record", "Record", tooltip="Write the calibration record, HTML and PDF"),
         Binding("w", "worst", "Worst first", tooltip="Sort by the error, or by the path"),
     ]
 
@@ -52,8 +56,8 @@ class VerifyFace(Face):
         with Horizontal(id="verify"):
             yield DataTable(id="verify-table", cursor_type="row", zebra_stripes=True)
             with Vertical(id="verify-plots"):
-                yield PairPlot("Position error, µm, pose by pose", id="verify-position")
-                yield PairPlot("Orientation error, mdeg, pose by pose", id="verify-angle")
+                yield LogPairPlot("Position error, µm, pose by pose", id="verify-position")
+                yield LogPairPlot("Orientation error, mdeg, pose by pose", id="verify-angle")
 
     def on_mount(self) -> None:
         """Name the panels."""
@@ -70,12 +74,8 @@ class VerifyFace(Face):
         self._drawn = drawn
         self._fill(before, after)
         for which, name in ((0, "position"), (1, "angle")):
-            series = {}
-            for label, verified in (("before", before), ("after", after)):
-                if verified is not None:
-                    errors = verified.errors[which]
-                    series[label] = (np.arange(1.0, len(errors) + 1.0), errors)
-            self.query_one(f"#verify-{name}", PairPlot).show(series, (id(before), id(after)))
+            plot = self.query_one(f"#verify-{name}", LogPairPlot)
+            plot.show(aligned(before, after, which), (id(before), id(after)))
 
     def _fill(self, before: Verified | None, after: Verified | None) -> None:
         table = self.query_one("#verify-table", DataTable)
@@ -138,14 +138,44 @@ class VerifyFace(Face):
             if answer:
                 self.act(lambda: self.desk.load_before(Path(answer)))
 
-        options = [(str(folder), folder.name) for folder in found]
+        options = [(str(folder), session_words(facts_of(folder))) for folder in found]
         self.app.push_screen(Pick("Before", "Finished verifications, newest first", options),
                              picked)  # fmt: skip
+
+    def action_record(self) -> None:
+        """Ask for the file, and write the record there as HTML and as pages."""
+        if self.desk.study.answer is None:
+            self.notify("Fit a run first (3 f): the record says what was found.")
+            return
+
+        def entered(answer: str | None) -> None:
+            if answer:
+                out = Path(answer).expanduser()
+                outs = [out.with_suffix(".html"), out.with_suffix(".pdf")]
+                self.act(lambda: self.desk.write_record(outs), busy="writing the record ...")
+
+        text = "File for the calibration record; it is written as .html and .pdf"
+        self.app.push_screen(Enter("Calibration record", text, "record"), entered)
 
     def action_worst(self) -> None:
         """Sort the other way."""
         self._worst_first = not self._worst_first
         self.draw()
+
+
+def aligned(
+    before: Verified | None, after: Verified | None, which: int
+) -> dict[str, tuple[Array, Array]]:
+    """Errors over the number of the pose: where both visited a pose, both stand at one place."""
+    shown = [(n, v) for n, v in (("before", before), ("after", after)) if v is not None]
+    places: dict[str, float] = {}
+    for _, one in sorted(shown, key=lambda each: -len(each[1].found.labels)):
+        for label in one.found.labels:
+            places.setdefault(label, float(len(places) + 1))
+    return {
+        name: (np.array([places[label] for label in one.found.labels]), one.errors[which])
+        for name, one in shown
+    }
 
 
 def summary_text(before: Verified | None, after: Verified | None) -> Content:
@@ -166,8 +196,9 @@ def summary_text(before: Verified | None, after: Verified | None) -> Content:
     assert last is not None
     found = last.found
     lines.append(Content(_row("tracker noise alone", found.noise_peak_um, found.noise_peak_deg)))
-    paper = _row("Han et al. 2020", PAPER["position_peak_um"], PAPER["orientation_peak_deg"])
-    lines.append(Content.assemble((f"{paper}            measured, after", "dim")))
+    if found.truth is not None:  # a mock: what was published of such a machine
+        paper = _row("Han et al. 2020", PAPER["position_peak_um"], PAPER["orientation_peak_deg"])
+        lines.append(Content.assemble((f"{paper}            measured, after", "dim")))
     return Content("\n").join(lines)
 
 

@@ -10,6 +10,7 @@ import click
 
 from app import answer
 from app.analysis_options import (
+    mask_option,
     model_options,
     offer_options,
     offers,
@@ -28,6 +29,7 @@ from calib.digits import plus_minus
 @model_options
 @offer_options
 @residuals_option
+@mask_option
 @answer.json_option
 def command(
     runs: tuple[str, ...],
@@ -36,6 +38,7 @@ def command(
     offer: tuple[Path, ...],
     site: Path | None,
     residuals: Path | None,
+    mask: tuple[str, ...],
     as_json: bool,
 ) -> None:
     """Score every known effect against what the model leaves of RUN...
@@ -45,7 +48,9 @@ def command(
     """
     outside_runs(residuals, runs)
     with answer.working("testing every known effect"):
-        asked = diagnose(runs, add=add, model=model, offer=offers(offer, site), watch=watcher())
+        asked = diagnose(
+            runs, add=add, model=model, offer=offers(offer, site), mask=mask, watch=watcher()
+        )
     written_residuals(asked, residuals)
     report = asked.to_json()
     answer.show(report, as_json, words(report))

@@ -10,6 +10,7 @@ import click
 
 from app import answer
 from app.analysis_options import (
+    mask_option,
     model_options,
     offer_options,
     offers,
@@ -27,6 +28,7 @@ from app.verbs.diagnose import bad_lines, not_asked, sizes, um
 @click.argument("runs", nargs=-1, required=True, metavar="RUN...")
 @model_options
 @offer_options
+@mask_option
 @click.option(
     "--save", type=answer.WrittenFile(), help="Write the model with what was found to FILE."
 )
@@ -38,6 +40,7 @@ def command(
     model: Path | None,
     offer: tuple[Path, ...],
     site: Path | None,
+    mask: tuple[str, ...],
     save: Path | None,
     residuals: Path | None,
     as_json: bool,
@@ -49,7 +52,9 @@ def command(
     outside_runs(save, runs)
     outside_runs(residuals, runs)
     with answer.working("looking for effects, adding the best, fitting again"):
-        found = discover(runs, add=add, model=model, offer=offers(offer, site), watch=watcher())
+        found = discover(
+            runs, add=add, model=model, offer=offers(offer, site), mask=mask, watch=watcher()
+        )
     if save is not None:
         found.save(save)
         answer.say(f"model written to {save}")

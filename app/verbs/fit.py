@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from app import answer
-from app.analysis_options import model_options, residuals_option, written_residuals
+from app.analysis_options import mask_option, model_options, residuals_option, written_residuals
 from app.files.runs import outside_runs
 from app.jobs.fitting import fit
 from app.show.record_words import excluded_lines, record_lines
@@ -19,6 +19,7 @@ from calib.digits import Digits, fixed
 @click.command()
 @click.argument("runs", nargs=-1, required=True, metavar="RUN...")
 @model_options
+@mask_option
 @click.option(
     "--save", type=answer.WrittenFile(), help="Write the model with what was found to FILE."
 )
@@ -28,6 +29,7 @@ def command(
     runs: tuple[str, ...],
     add: tuple[str, ...],
     model: Path | None,
+    mask: tuple[str, ...],
     save: Path | None,
     residuals: Path | None,
     as_json: bool,
@@ -39,7 +41,7 @@ def command(
     """
     outside_runs(save, runs)
     outside_runs(residuals, runs)
-    found = fit(runs, add=add, model=model)
+    found = fit(runs, add=add, model=model, mask=mask)
     if save is not None:
         found.save(save)
         answer.say(f"model written to {save}")

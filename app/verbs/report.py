@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from app import answer
-from app.analysis_options import model_options
+from app.analysis_options import mask_option, model_options
 from app.files.runs import outside_runs
 from app.files.site import load_site
 from app.report.accuracy import Tolerance
@@ -17,6 +17,7 @@ OUT = (Path("report.html"), Path("report.pdf"))
 @click.command()
 @click.argument("runs", nargs=-1, required=True, metavar="RUN...")
 @model_options
+@mask_option
 @click.option(
     "--before",
     type=click.Path(path_type=Path),
@@ -61,6 +62,7 @@ def command(
     runs: tuple[str, ...],
     add: tuple[str, ...],
     model: Path | None,
+    mask: tuple[str, ...],
     before: Path | None,
     after: Path | None,
     site_file: Path | None,
@@ -82,6 +84,7 @@ def command(
     asked = Asked(
         add=add,
         model=model,
+        mask=mask,
         before=before,
         after=after,
         site=load_site(site_file) if site_file is not None else None,

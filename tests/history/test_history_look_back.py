@@ -15,6 +15,7 @@ from app.jobs.listing import list_sessions, session_log
 from app.jobs.looking_back import history_of
 from app.session.folder import make_folder
 from app.session.journal import IDENTITIES, Journal
+from app.session.listing import Following
 from app.session.plans import PlanOptions, measure_plan
 from calib.trend import change, drift, family_wise
 from tests.answers import faults_of
@@ -64,6 +65,27 @@ def test_the_log_is_told_by_the_clock(root: Path) -> None:
     found = session_log(None, root)
     assert [entry.kind for entry in found.entries] == [*["started", "done"] * 3, "answer"]
     assert found.entries[-1].utc == "2026-11-29T06:00:03.000+00:00"
+
+
+def test_a_session_is_followed_while_it_goes_on(tmp_path: Path) -> None:
+    site = parse_site(SITE, "site.toml", tmp_path)
+    plan = measure_plan(site, POSES, PlanOptions())
+    folder = make_folder(tmp_path, site, plan)
+    followed, journal = Following(folder), Journal(folder / "journal.sqlite")
+    assert followed.news() == []
+    journal.started(plan.steps[0].id, 1, 0.0, "2026-11-29T06:00:00.000+00:00")
+    journal.note("alarm", "tracker: cold", 0.0, "2026-11-29T06:00:01.000+00:00")
+    assert [one.kind for one in followed.news()] == ["started", "alarm"]
+    assert followed.news() == []
+    journal.done(plan.steps[0].id, 1, 2.0, "2026-11-29T06:00:02.000+00:00", {})
+    assert [one.text for one in followed.news()] == [plan.steps[0].says]
+    assert (followed.facts.state, followed.facts.done) == ("begun", 1)
+    journal.set_meta("finished_utc", "2026-11-29T06:00:03+00:00")
+    journal.close()
+    said = CliRunner().invoke(pkmcal, ["attach", str(folder)])
+    assert said.exit_code == 0
+    assert plan.steps[0].says in said.output
+    assert "finished" in said.output
 
 
 def test_what_changed_more_than_chance_is_named_and_a_drift_has_its_forecast(root: Path) -> None:

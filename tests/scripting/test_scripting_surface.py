@@ -21,9 +21,9 @@ SIGNATURES = {
     "every=None, before=None, extrapolate=False",
     "design": "runs, discriminate, n=10, *, add=(), model=None, offer=(), candidates=250, seed=1, "
     "watch=None",
-    "diagnose": "runs, *, add=(), model=None, offer=(), watch=None",
-    "discover": "runs, *, add=(), model=None, offer=(), watch=None",
-    "fit": "runs, *, add=(), model=None",
+    "diagnose": "runs, *, add=(), model=None, offer=(), mask=(), watch=None",
+    "discover": "runs, *, add=(), model=None, offer=(), mask=(), watch=None",
+    "fit": "runs, *, add=(), model=None, mask=()",
     "guess_map": "files, out, *, machine=None",
     "import_run": "files, map, run, *, machine=None, header=None, commands=None, "
     "as_it_stands=False",

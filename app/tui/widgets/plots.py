@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from textual_plot import HiResMode, PlotWidget
+from textual_plot.axis_formatter import NumericAxisFormatter
 
 from app.tui.picture import Point
 from app.tui.theme import BASE, SERIES
@@ -116,6 +117,42 @@ class PairPlot(QuietPlot):
         self.border_subtitle = "   ".join(
             f"{marker} {name}" for name, (marker, _) in zip(drawn, SERIES, strict=False)
         )
+
+
+class Decades(NumericAxisFormatter):
+    """Labels an axis of logarithms with the numbers themselves."""
+
+    def get_ticks_and_labels(
+        self, min_: float, max_: float, max_ticks: int = 8
+    ) -> tuple[list[float], list[str]]:
+        """Whole decades, and 2 and 5 between them where there are few."""
+        whole = range(math.floor(min_), math.ceil(max_) + 1)
+        parts = (1.0, 2.0, 5.0) if max_ - min_ < 1.5 else (1.0,)
+        values = [part * 10.0**decade for decade in whole for part in parts]
+        shown = [value for value in values if min_ <= math.log10(value) <= max_]
+        return [math.log10(value) for value in shown], [f"{value:g}" for value in shown]
+
+
+class LogPairPlot(PairPlot):
+    """The same over a logarithmic axis: a machine before and after differs by decades."""
+
+    def on_mount(self) -> None:
+        """Label the decades."""
+        super().on_mount()
+        self.set_y_formatter(Decades())
+
+    def show(self, series: Mapping[str, tuple[Array, Array]], key: object) -> None:
+        """Draw named series of x and y; zeros stand at the bottom."""
+        known = {name: xy for name, xy in series.items() if len(xy[0])}
+        least = min(
+            (float(y[y > 0].min()) for _, y in known.values() if (y > 0).any()), default=1.0
+        )
+        lifted = {name: (x, np.log10(np.maximum(y, least))) for name, (x, y) in known.items()}
+        super().show(lifted, key)
+        if known:
+            bottom = math.log10(least)
+            top = max(float(y.max()) for _, y in lifted.values())
+            self.set_ylimits(bottom - 0.08, max(top + 0.08, bottom + 0.5))
 
 
 class BinPlot(QuietPlot):

@@ -1,0 +1,52 @@
+"""The empty first screen: the whole job as a list, what lies in the folder, a run to try it on."""
+
+from datetime import datetime
+from pathlib import Path
+
+from textual.content import Content
+
+from app.session.listing import SessionFacts
+from app.tui.next_step import JobStep
+
+MYSTERY = Path(__file__).parents[2] / "tests" / "data" / "runs" / "mystery"
+"""The run of the first tutorial, where the program lies in a clone."""
+
+
+def session_words(facts: SessionFacts) -> str:
+    """One session in a list: when, what, of which machine, how far, title."""
+    when = facts.begun_utc
+    clock = f"{datetime.fromisoformat(when).astimezone():%Y-%m-%d %H:%M}" if when else "?"
+    state = "" if facts.state == "finished" else f", {facts.done} of {facts.steps} steps"
+    machine = f"{facts.machine} {facts.serial}".strip()
+    title = f" · {facts.title}" if facts.title else ""
+    return f"{clock}  {facts.purpose}, {machine}{state}{title}"
+
+
+def start_text(steps: list[JobStep], recent: list[SessionFacts]) -> Content:
+    """What is to be done, in its order, with keys; then the last sessions."""
+    lines = [
+        Content.from_markup(
+            "No site is open.  [bold $accent]o[/] opens a site file,  "
+            "[bold $accent]m[/] starts a mock machine."
+        )
+    ]
+    if MYSTERY.is_dir():
+        lines.append(
+            Content.from_markup(
+                "[bold $accent]t[/] tries the mystery run: what is wrong with this hexapod?"
+            )
+        )
+    lines.append(Content(""))
+    lines += [
+        Content.from_markup(
+            "[dim]$number[/] [bold]$keys[/]  $says",
+            number=f"{number}.",
+            keys=f"{step.keys:<8}",
+            says=step.says,
+        )
+        for number, step in enumerate(steps, start=1)
+    ]
+    if recent:
+        lines += [Content(""), Content.from_markup("[dim]last sessions[/]")]
+        lines += [Content(session_words(facts)) for facts in recent]
+    return Content("\n").join(lines)

@@ -1,0 +1,77 @@
+"""Watch a session that another terminal runs"""
+
+import time
+from datetime import datetime
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from app import answer
+from app.session.folder import latest_session
+from app.session.listing import Following, Happening
+
+POLL_S = 0.5
+SILENT_S = 30.0
+"""After so long without an entry it is said that nothing happens."""
+LAST = 12
+"""Entries of before that are shown first."""
+
+
+@click.command()
+@click.argument("session", required=False, type=click.Path(path_type=Path))
+@click.option(
+    "--folder",
+    default="sessions",
+    type=click.Path(path_type=Path),
+    help="Where sessions are; the newest is watched if none is named.",
+)
+def command(session: Path | None, folder: Path) -> None:
+    """Show SESSION as it goes on in another terminal, until it is finished; Ctrl-C leaves it.
+
+    Only its journal is read: nothing that is done here reaches the machine, and the session goes
+    on whether it is watched or not. To stop the machine use the terminal that runs it, or the
+    emergency stop.
+    """
+    followed = Following(session if session is not None else latest_session(folder))
+    facts = followed.facts
+    answer.say(f"{followed.folder}: {facts.purpose}, {facts.machine} {facts.serial}, {facts.title}")
+    try:
+        _watch(followed)
+    except KeyboardInterrupt:
+        answer.say("left; the session goes on")
+
+
+def _watch(followed: Following) -> None:
+    console = Console(highlight=False, soft_wrap=True)
+    columns = (TextColumn("{task.completed:.0f} of {task.total:.0f}"), BarColumn(24),
+               TextColumn("{task.description}", markup=False))  # fmt: skip
+    news = followed.news()[-LAST:]
+    quiet_since = time.monotonic()
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
+        task = bar.add_task("", total=None)
+        while True:
+            for one in news:
+                if one.kind != "started":
+                    console.print(_line(one), markup=False)
+            facts = followed.facts
+            doing = next((one.text for one in reversed(news) if one.kind == "started"), None)
+            bar.update(task, completed=facts.done, total=facts.steps)
+            if news:
+                quiet_since = time.monotonic()
+                bar.update(task, description=doing or "")
+            elif (quiet := time.monotonic() - quiet_since) > SILENT_S:
+                bar.update(task, description=f"nothing for {quiet:.0f} s; is it still running?")
+            if facts.state == "finished":
+                answer.say(f"finished: {facts.readings} readings")
+                return
+            time.sleep(POLL_S)
+            news = followed.news()
+
+
+def _line(one: Happening) -> str:
+    clock = f"{datetime.fromisoformat(one.utc).astimezone():%H:%M:%S}" if one.utc else "        "
+    return f"{clock}  {one.kind:8}  {one.text}"
