@@ -8,7 +8,7 @@ import asyncio
 import math
 import struct
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -63,6 +63,8 @@ class CanopenController:
         heartbeat_s: float = 0.1,
         silence_s: float = 1.0,
         options: Mapping[str, Any] | None = None,
+        drive_nodes: Sequence[int] = (),
+        drive_eds: Sequence[Path] = (),
     ) -> "CanopenController":
         """Open the bus, recognise the controller and watch all nodes. Nothing moves.
 
@@ -82,6 +84,10 @@ class CanopenController:
             Wall time without a heartbeat after which a node, or this PC, counts as lost.
         options : mapping, optional
             Further keywords of the interface, as python-can calls them.
+        drive_nodes : sequence of int, optional
+            Nodes of the drives; 1, 2, ... if there are none.
+        drive_eds : sequence of path, optional
+            EDS file of the drives, one for all or one for each; the shipped one if there is none.
 
         Raises
         ------
@@ -98,7 +104,7 @@ class CanopenController:
         )  # fmt: skip
         link = await CanLink.open(address)
         try:
-            bus = MachineBus(link, layout, node_id, path)
+            bus = MachineBus(link, layout, node_id, path, drive_nodes, drive_eds)
             identity = await bus.recognise(serial, limits or {})
             await bus.watch()
             await bus.note_faults()

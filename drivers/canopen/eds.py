@@ -40,6 +40,18 @@ def dictionary(path: Path, node_id: int) -> ObjectDictionary:
     return _dictionary(str(path), path.stat().st_mtime_ns, node_id)
 
 
+def need_dictionary(path: Path, node_id: int, device: str) -> ObjectDictionary:
+    """Read the EDS file of a device; raises DeviceError if it cannot be read as one."""
+    try:
+        return dictionary(path, node_id)
+    except Exception as error:  # the package's reader raises whatever the text leads it to
+        raise DeviceError(
+            f"{path} cannot be read as an EDS file: {error}",
+            device=device,
+            remedy="Name the EDS file of this very device in [controller]",
+        ) from error
+
+
 @lru_cache(maxsize=64)
 def _dictionary(path: str, _changed_ns: int, node_id: int) -> ObjectDictionary:
     objects = import_od(path, node_id)

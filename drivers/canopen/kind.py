@@ -1,6 +1,6 @@
 """The kind ``canopen`` of site files."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +21,8 @@ async def _open(around: Surroundings) -> MotionController:
 
     settings = around.settings
     eds = Path(settings["eds"]) if settings["eds"] else eds_path(f"{around.machine}_controller")
+    nodes = list(settings["drive_nodes"]) or range(1, len(around.actuators) + 1)
+    _must_differ(nodes, settings["node"])
     _must_be_of(read_layout(eds, settings["node"]), eds, around)
     return await CanopenController.connect(
         settings["interface"],
@@ -34,6 +36,8 @@ async def _open(around: Surroundings) -> MotionController:
         heartbeat_s=settings["heartbeat_s"],
         silence_s=settings["silence_s"],
         options=settings["can"],
+        drive_nodes=[int(node) for node in nodes],
+        drive_eds=[Path(path) for path in settings["drive_eds"]],
     )
 
 
@@ -73,6 +77,24 @@ def known_interface(name: str) -> str:
     return f"python-can has no interface {name!r}. {meant} has {', '.join(known)}"
 
 
+def different_nodes(values: Any) -> str:
+    """What is wrong with the node numbers of drives; empty if nothing is."""
+    whole = all(value == int(value) and 1 <= value <= 126 for value in values)
+    if not whole or len(set(values)) < len(values):
+        return f"nodes are {list(values)}: different whole numbers from 1 to 126 are wanted"
+    return ""
+
+
+def _must_differ(nodes: Sequence[float], controller: int) -> None:
+    """Refuse a drive at the node of the controller."""
+    if controller in nodes:
+        raise Refused(
+            f"node {controller} is the controller and a drive at once",
+            device="site file",
+            remedy="Correct node or drive_nodes in [controller]",
+        )
+
+
 def _address(settings: Mapping[str, Any]) -> str:
     return str(settings["channel"])
 
@@ -87,6 +109,14 @@ KIND: Kind[MotionController] = Kind(
         Setting("bitrate", "whole", "of the bus, bit/s; 0 where the adapter knows it", 0),
         Setting("can", "table", "further keywords of the interface, as python-can calls them", {}),
         Setting("node", "whole", "node of the controller", 10, least=1, most=127),
+        Setting(
+            "drive_nodes", "numbers", "nodes of its drives; left out, 1, 2, ...", (),
+            count="actuators", check=different_nodes,
+        ),
+        Setting(
+            "drive_eds", "files", "EDS file of its drives, one for all or one for each actuator; "
+            "left out, the one that ships", (), count="actuators",
+        ),
         Setting("eds", "file", "its EDS file; left out, the one that ships for the machine", ""),
         Setting("heartbeat_s", "number", "period of the heartbeats, s", 0.1, least=0.01, most=10.0),
         Setting(

@@ -1,10 +1,10 @@
 """All nodes of one machine: recognised, configured, watched, halted and left together."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from drivers.canopen.drive402 import QUICK_STOP, Drive402
-from drivers.canopen.eds import drive_eds_path
+from drivers.canopen.eds import drive_eds_path, need_dictionary
 from drivers.canopen.layout import Layout
 from drivers.canopen.link import CanLink
 from drivers.canopen.motion import STOP, MotionChannel
@@ -15,15 +15,31 @@ from drivers.interface import Identity
 
 
 class MachineBus(Nodes):
-    """The controller node and its drives (nodes 1, 2, ...) on an open link."""
+    """The controller node and its drives on an open link.
 
-    def __init__(self, link: CanLink, layout: Layout, node_id: int, eds: Path) -> None:
+    ``drive_nodes`` are 1, 2, ... if there are none; ``drive_eds`` is the shipped one, one for all,
+    or one for each.
+    """
+
+    def __init__(
+        self,
+        link: CanLink,
+        layout: Layout,
+        node_id: int,
+        eds: Path,
+        drive_nodes: Sequence[int] = (),
+        drive_eds: Sequence[Path] = (),
+    ) -> None:
         super().__init__(link)
         self.layout = layout
         self.controller = link.add_device(node_id, eds, f"controller (node {node_id})")
-        drive_eds = drive_eds_path(layout.machine)
-        for number, name in enumerate(layout.actuators, start=1):
-            device = link.add_device(number, drive_eds, f"drive {name} (node {number})")
+        count = len(layout.actuators)
+        files = list(drive_eds) or [drive_eds_path(layout.machine)]
+        files = files * count if len(files) == 1 else files
+        nodes = list(drive_nodes) or range(1, count + 1)
+        for number, name, file in zip(nodes, layout.actuators, files, strict=True):
+            need_dictionary(file, number, f"drive {name}")
+            device = link.add_device(number, file, f"drive {name} (node {number})")
             self.drives.append(Drive402(device, name))
         self.devices = [self.controller, *(drive.remote for drive in self.drives)]
         self.motion = MotionChannel(self.controller, layout)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from drivers.canopen.kind import known_interface
+from drivers.canopen.kind import different_nodes, known_interface
 from drivers.interface import Motors
 from drivers.kind import REQUIRED, Kind, Setting, Surroundings
 
@@ -17,13 +17,6 @@ async def _open(around: Surroundings) -> Motors:
 
 def _address(settings: Mapping[str, Any]) -> str:
     return str(settings["channel"])
-
-
-def _nodes(values: Any) -> str:
-    whole = all(value == int(value) and 1 <= value <= 126 for value in values)
-    if not whole or len(set(values)) < len(values):
-        return f"nodes are {list(values)}: different whole numbers from 1 to 126 are wanted"
-    return ""
 
 
 def _signs(values: Any) -> str:
@@ -71,7 +64,7 @@ KIND: Kind[Motors] = Kind(
             "eds", "files", "EDS file of the drives: one for all, or one for each actuator",
             count="actuators",
         ),
-        _each("nodes", "node numbers; left out, 1, 2, ...", check=_nodes),
+        _each("nodes", "node numbers; left out, 1, 2, ...", check=different_nodes),
         _each(
             "counts_per_unit", "counts of a drive's position in 1 mm or rad; left out, by the "
             "drive's 0x60A8, or 0x608F, 0x6091 and 0x6092", check=_positive,

@@ -71,15 +71,23 @@ class Stored:
                 "Set LINEAR_UNITS = mm and ANGULAR_UNITS = degree under [TRAJ]",
             )
         for n in range(len(self.places.limbs)):
-            section = f"JOINT_{n}"
-            if self.ini.number(section, "HOME_ABSOLUTE_ENCODER") or not self.ini.number(
-                section, "HOME_SEARCH_VEL"
-            ):
+            if not self._finds_its_reference(f"JOINT_{n}"):
                 self._refuse(
-                    f"joint {n} is at home wherever it stands (HOME_SEARCH_VEL = 0, or an absolute "
-                    "encoder): its L0 cannot be found again",
-                    f"Home it by a switch: HOME_SEARCH_VEL and HOME_LATCH_VEL in [{section}]",
+                    f"joint {n} is at home wherever it stands (HOME_SEARCH_VEL = 0 without an "
+                    "index pulse, or an absolute encoder): its L0 cannot be found again",
+                    f"Home it by a switch: HOME_SEARCH_VEL and HOME_LATCH_VEL in [JOINT_{n}], or "
+                    "by the index pulse alone: HOME_SEARCH_VEL = 0, HOME_LATCH_VEL, and "
+                    "HOME_USE_INDEX = YES",
                 )
+
+    def _finds_its_reference(self, section: str) -> bool:
+        """Whether a joint is homed at a place of its own: a switch, or the index pulse alone."""
+        if self.ini.number(section, "HOME_ABSOLUTE_ENCODER"):
+            return False
+        by_index = self.ini.get(section, "HOME_USE_INDEX").split("#")[0].strip().upper()
+        index = by_index in ("YES", "TRUE", "1", "ON")
+        latches = self.ini.number(section, "HOME_LATCH_VEL") != 0.0
+        return self.ini.number(section, "HOME_SEARCH_VEL") != 0.0 or (index and latches)
 
     def _refuse(self, what: str, remedy: str) -> None:
         raise Refused(what, device=f"linuxcnc {self.ini.path.name}", remedy=remedy)

@@ -1,6 +1,7 @@
 """Everything that goes wrong between PC, bus and drives ends at rest and in words."""
 
 import asyncio
+import shutil
 import socket
 
 import can
@@ -8,8 +9,10 @@ import pytest
 from canopen_bench import FAST_MM_PER_S, set_speed, until
 
 from drivers.canopen import CanopenController
+from drivers.canopen.eds import drive_eds_path
 from drivers.errors import (
     ConnectFailed,
+    DeviceError,
     DeviceFault,
     DriveFault,
     HeartbeatLost,
@@ -166,6 +169,28 @@ async def test_nobody_at_the_address():
 async def test_adapter_without_a_controller(station):
     with pytest.raises(ConnectFailed, match="node 42"):
         await CanopenController.connect("slcan", station.channel, node_id=42)
+
+
+async def test_drives_are_looked_for_at_their_own_nodes_with_their_own_eds(
+    station, tmp_path
+) -> None:
+    own = tmp_path / "own.eds"
+    shutil.copy(drive_eds_path("hexapod"), own)
+    turned = [6, 5, 4, 3, 2, 1]
+    controller = await CanopenController.connect(
+        "slcan", station.channel, drive_nodes=turned, drive_eds=[own]
+    )
+    try:
+        assert [drive.remote.id for drive in controller._drives] == turned
+        assert [drive.name for drive in controller._drives] == [f"q{n}" for n in range(1, 7)]
+    finally:
+        await controller.close()
+    with pytest.raises(ConnectFailed, match="node 77"):
+        await CanopenController.connect("slcan", station.channel, drive_nodes=[1, 2, 3, 4, 5, 77])
+    with pytest.raises(DeviceError, match="cannot be read as an EDS file"):
+        await CanopenController.connect(
+            "slcan", station.channel, drive_eds=[tmp_path / "missing.eds"]
+        )
 
 
 async def test_drive_that_is_switched_off(station):

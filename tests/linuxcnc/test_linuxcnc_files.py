@@ -105,6 +105,35 @@ def test_what_is_stored_is_what_would_be_loaded(tmp_path: Path) -> None:
     assert places().parameters(again.pins(dict.fromkeys(places().pins, 0.0))) == values
 
 
+@pytest.mark.parametrize(
+    ("homing", "refused"),
+    [
+        ("HOME_SEARCH_VEL = 20\nHOME_LATCH_VEL = 2", False),
+        ("HOME_SEARCH_VEL = 0\nHOME_LATCH_VEL = 2\nHOME_USE_INDEX = YES", False),
+        ("HOME_LATCH_VEL = -2.0\nHOME_USE_INDEX = yes # every turn", False),
+        ("HOME_SEARCH_VEL = 0\nHOME_LATCH_VEL = 2\nHOME_USE_INDEX = NO", True),
+        ("HOME_SEARCH_VEL = 0\nHOME_LATCH_VEL = 0\nHOME_USE_INDEX = YES", True),
+        ("HOME_SEARCH_VEL = 20\nHOME_LATCH_VEL = 2\nHOME_ABSOLUTE_ENCODER = 1", True),
+    ],
+)
+def test_joints_without_a_reference_of_their_own_are_refused(
+    tmp_path: Path, homing: str, refused: bool
+) -> None:
+    ini = write_configuration(tmp_path, NOMINAL, NORMALS, "7")
+    others = [line for line in ini.read_text().splitlines() if not line.startswith("HOME_")]
+    head = others.index("[JOINT_0]")
+    texts = [line + (f"\n{homing}" if line.startswith("[JOINT_") else "") for line in others]
+    assert texts[head] == f"[JOINT_0]\n{homing}"
+    ini.write_text("\n".join(texts) + "\n")
+    stored = Stored.of({"ini": str(ini), "hal": ""}, places())
+    state = {"ini": str(ini), "joints": [0.0] * 6, "mm": 1.0, "degrees": 1.0}
+    if not refused:
+        stored.check(state)
+        return
+    with pytest.raises(Refused, match="wherever it stands"):
+        stored.check(state)
+
+
 class Answers:
     """Answers to a template's questions: the INI file, and what is proposed otherwise."""
 

@@ -51,6 +51,30 @@ async def test_joints_are_commanded_where_the_engine_has_them(bench: Bench, lead
             assert np.abs(sent - ours).max() < 1e-9
 
 
+async def test_backlash_is_taken_up_half_in_each_direction(bench: Bench) -> None:
+    """Motors are sent ahead of the joint by half the backlash, in the direction of the move."""
+    lost = 0.04
+    pins = ["joint.0.motor-pos-cmd", "joint.0.pos-cmd", "joint.0.motor-offset"]
+    async with bench.driver() as controller:
+        before = await controller.read_parameters()
+        await controller.write_parameters({"backlash.leg1": lost})
+        await ready(controller)
+        length, seen = None, []
+        for pose in some_poses(8, seed=4):
+            targets = await controller.move_to_pose(pose)
+            await controller.wait_arrived(20.0)
+            values = (await controller._ask("get", pins=pins))["values"]
+            ahead = values[pins[0]] - values[pins[1]] - values[pins[2]]
+            if length is not None:
+                seen.append((float(np.sign(targets[0] - length)), ahead))
+            length = targets[0]
+        await controller.disable()
+        await controller.write_parameters({"backlash.leg1": before["backlash.leg1"]})
+    assert {direction for direction, _ in seen} == {-1.0, 1.0}
+    for direction, ahead in seen:
+        assert ahead == pytest.approx(0.5 * lost * direction, abs=1e-4)
+
+
 async def test_another_ini_file_is_refused(bench: Bench, tmp_path: Path) -> None:
     other = tmp_path / "other.ini"
     text = bench.station.program.ini.read_text(encoding="utf-8")
