@@ -87,14 +87,14 @@ def _of_reading(fit: Fit) -> list[Variable]:
     rows, situation, kept = fit.model.rows, fit.linear.situation, fit.accepted
     count = fit.readings
     x, y, z = situation.point[:, kept]
-    points = Response("point", accepted(fit, np.swapaxes(situation.whitener, 0, 1)))
+    points = Response("point", accepted(fit, rows.folded(np.swapaxes(situation.whitener, 0, 1))))
     turned = np.moveaxis(situation.frame_rotation, 1, 0)
     platform = [
         rotate(situation.rotation, axis[:, None] * np.ones(rows.count)) for axis in np.eye(3)
     ]
     in_tracker = [np.einsum("jin,jn->in", turned, one) for one in platform]
     seats = np.stack([np.einsum("ijn,jn->in", situation.whitener, one) for one in in_tracker])
-    seats = seats * rows.on_platform
+    seats = rows.folded(seats * rows.on_platform)
     labels = {name: number for number, name in enumerate(dict.fromkeys(rows.nest_name))}
     nest = np.array([labels[name] for name in rows.nest_name], dtype=np.float64)[kept]
     found = [

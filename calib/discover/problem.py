@@ -75,7 +75,9 @@ def variables_of(fit: Fit) -> list[Variable]:
     """Everything that the residual could depend on, with what it could act on."""
     rows, situation = fit.model.rows, fit.linear.situation
     legs, own, axes = every_leg(fit), each_leg(fit), rows.machine.axes
-    points = Response("point", accepted(fit, np.swapaxes(situation.whitener, 0, 1)), "mm", 0.01)
+    points = Response(
+        "point", accepted(fit, rows.folded(np.swapaxes(situation.whitener, 0, 1))), "mm", 0.01
+    )
     found = [
         Variable(f"q{k + 1}", _rows_of(fit, s), (leg,), ("smooth", "periodic"), axis.shortest)
         for k, (s, leg, axis) in enumerate(zip(rows.extension, own, axes, strict=True))
@@ -115,7 +117,7 @@ def quadratics_of(fit: Fit) -> list[Quadratic]:
         found.append(Neighbours((axes + pair).reshape(-1), (axes + pair + 1).reshape(-1)))
     motions = rigid_motions(situation.base_point - situation.position)
     turned = np.stack([rotate(situation.frame_rotation, one) for one in motions])
-    whitened = np.einsum("ijn,ujn->uin", situation.whitener, turned)
+    whitened = rows.folded(np.einsum("ijn,ujn->uin", situation.whitener, turned))
     labels = [
         f"{run} {name}" if on else ""
         for run, name, on in zip(rows.run, rows.pose_name, rows.on_platform, strict=True)

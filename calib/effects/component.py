@@ -116,7 +116,7 @@ class Situation:
     @cached_property
     def actuator_columns(self) -> Array:
         """Whitened derivative (n, 3, N) of the readings by each extension."""
-        return through(self.lever, self.actuator_twists)
+        return self.rows.folded(through(self.lever, self.actuator_twists))
 
     def element_twists(self, places: Sequence[tuple[int, int]]) -> Array:
         """Twist (len(places), 6, N) of the platform per mm or rad of (limb, element) each."""

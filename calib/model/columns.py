@@ -44,7 +44,7 @@ def whitened_columns(signature: Signature, situation: Situation) -> Array:
         total = total + apply_each(situation.whitened_frame * rows.on_platform, turned)
     if signature.point is not None:
         total = total + apply_each(situation.whitener * rows.optical, _known(signature.point))
-    return np.asarray(total)
+    return rows.folded(np.asarray(total))
 
 
 def _known(shape: Array) -> Array:

@@ -99,10 +99,14 @@ def observe(sensed: Sensed, point: Array, ends: Ends) -> Observed:
     here = of == DIRECTION
     value[0, here] = (np.einsum("in,in->n", ends.normal, point) - ends.offset)[here]
     slope[0][:, here] = ends.normal[:, here]
-    here = of == DISTANCE
-    apart = point[:, here] - np.nan_to_num(ends.second[:, here])
+    here = (of == DISTANCE) & ~sensed.ghost
+    second = np.nan_to_num(ends.second)
+    far = np.flatnonzero(sensed.partner >= 0)
+    second[:, far] = point[:, sensed.partner[far]]
+    apart = point[:, here] - second[:, here]
     length = np.linalg.norm(apart, axis=0)
     value[0, here], slope[0][:, here] = length, apart / np.maximum(length, 1e-12)
+    slope[0][:, sensed.partner[far]] = -slope[0][:, far]
     here = of == ANGLES
     value[:2, here], slope[:2, :, here] = _angles(point[:, here])
     here = of == TILT

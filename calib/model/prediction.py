@@ -140,6 +140,10 @@ class Model:
         usable = np.ones(self.rows.count, dtype=bool)
         for effect in self.effects:
             usable &= channels_known(effect, self.rows)
+        if self.rows.sensed is not None:
+            far = np.flatnonzero(self.rows.sensed.partner >= 0)
+            usable[far] &= usable[self.rows.sensed.partner[far]]
+            usable &= ~self.rows.sensed.ghost
         return usable
 
     @cached_property
@@ -211,10 +215,10 @@ class Model:
         )
         now = replace(state, near=situation)
         signatures = self._signatures(now)
-        parts = [through(situation.lever, situation.parameter_twists[self.free])]
+        parts = [rows.folded(through(situation.lever, situation.parameter_twists[self.free]))]
         parts += [whitened_columns(signature, situation) for _, signature in signatures]
         if self.setup.unknowns:
-            parts.append(self.setup.columns(situation, state.setup))
+            parts.append(rows.folded(self.setup.columns(situation, state.setup)))
         parts += self._frame_columns(turned, situation)
         seen = self._observed(now, settled, point, signatures)
         if seen is None:
@@ -358,6 +362,7 @@ class Model:
         whitened = apply_each(situation.whitener, motions)
         if situation.turner is not None:
             whitened[3:] += np.moveaxis(situation.turner, 1, 0)
+        whitened = rows.folded(whitened)
         return [whitened * (rows.frame == frame) for frame in range(self.frames)]
 
     def moved(self, state: State, step: Array) -> State:

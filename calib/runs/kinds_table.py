@@ -40,7 +40,7 @@ TURNS = tuple(f"s{name}" for name in EULER)
 CIRCLES, CIRCLE_SIGMAS = ("azimuth", "elevation"), ("sazimuth", "selevation")
 SIX = (*POSITION, *EULER)
 POSE_COVARIANCES = {f"s{SIX[i]}{SIX[j]}": (i, j) for i in range(6) for j in range(i + 1, 6)}
-TEXTS = ("kind", "instrument", "nest2", "plane")
+TEXTS = ("kind", "instrument", "nest2", "plane", "pose2")
 AXIS = ("ax", "ay", "az")
 NUMBERS = (
     *POSITION, *SIGMAS, *COVARIANCES, "value", "sigma", *CIRCLES, *CIRCLE_SIGMAS, *EULER,
@@ -58,7 +58,7 @@ _WANTED = {
 _OWN = {
     POINT: {*POSITION, *SIGMAS, *COVARIANCES},
     DIRECTION: {"value", "sigma", *AXIS, "plane"},
-    DISTANCE: {"value", "sigma", "nest2"},
+    DISTANCE: {"value", "sigma", "nest2", "pose2"},
     ANGLES: {*CIRCLES, *CIRCLE_SIGMAS},
     TILT: {"value", "sigma", *AXIS},
     POSE: {*SIX, *SIGMAS, *TURNS, *QUATERNION, *POSE_COVARIANCES},
@@ -105,6 +105,7 @@ def points_of_kinds(table: _Table, header: Header, setup: Setup, actuators: int)
             instrument=tuple(made.instrument),
             second=tuple(reader.second_of(row) for row in range(time_s.size)),
             plane=tuple(made.plane),
+            ends=made.ends,
             seen=made.seen,
             axis=made.axis,
             attitude=made.attitude,
@@ -123,6 +124,7 @@ class _Made:
     instrument: list[str]
     second: list[str]
     plane: list[str]
+    ends: NDArray[np.intp]
     seen: NDArray[np.bool_]
     axis: Array
     attitude: Array
@@ -144,6 +146,7 @@ class _Blank:
             instrument=[""] * n,
             second=[""] * n,
             plane=[""] * n,
+            ends=np.full((2, n), -1, dtype=np.intp),
             seen=np.zeros((3, n), dtype=bool),
             axis=np.zeros((3, n)),
             attitude=np.repeat(np.eye(3)[:, :, None], n, axis=2),
@@ -242,7 +245,7 @@ class _Reader:
                 )
 
     def _check_own(self, row: int, kind: int) -> None:
-        for name in ("nest2", "plane", *NUMBERS):
+        for name in ("nest2", "plane", "pose2", *NUMBERS):
             if name not in _OWN[kind] and self.text(row, name):
                 raise self.fault(
                     row, name, f"{name} = {self.text(row, name)} in a row of kind {KINDS[kind]}"
@@ -407,6 +410,9 @@ class _Reader:
         header, second = self.header, self.text(row, "nest2")
         if value <= 0.0 and instrument.zero_sigma is None:
             raise self.table.wrong(row, "value", "a distance in mm, larger than zero")
+        if self.text(row, "pose2"):
+            self._marks(row, second or self.text(row, "nest"))
+            return
         if not second:
             if instrument.frame != "free":
                 raise self.fault(
@@ -419,4 +425,22 @@ class _Reader:
             raise self.table.wrong(row, "nest2", f"one of {known} (run.toml)")
         if second == self.text(row, "nest"):
             raise self.table.wrong(row, "nest2", "another nest than in the column nest")
+        self.made.second[row] = second
+
+    def _marks(self, row: int, second: str) -> None:
+        """Ends of a distance between marks that the platform has left at two poses."""
+        labels = [self.text(row, name) for name in ("pose", "pose2")]
+        for name, nest in (("nest", self.text(row, "nest")), ("nest2", second)):
+            if nest not in self.header.platform_nests:
+                raise self.table.wrong(row, name, "a nest of the platform, which left the mark")
+        for end, (column, label) in enumerate(zip(("pose", "pose2"), labels, strict=True)):
+            before = [
+                k for k in range(row)
+                if self.text(k, "pose") == label and self.made.ends[0, k] < 0
+            ]  # fmt: skip
+            if not label or not before:
+                raise self.table.wrong(row, column, "a pose of an earlier row")
+            self.made.ends[end, row] = before[-1]
+        if self.made.ends[0, row] == self.made.ends[1, row] and second == self.text(row, "nest"):
+            raise self.table.wrong(row, "pose2", "another pose than in the column pose")
         self.made.second[row] = second

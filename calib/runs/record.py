@@ -81,8 +81,14 @@ def holdout_folds(run: Run) -> NDArray[np.int64]:
     return np.array([fold.get(label, -1) for label in labels], dtype=np.int64)
 
 
+def _within(run: Run, row: int) -> bool:
+    """Whether a row holds a distance between two nests of the platform, wherever it stood."""
+    own = run.sensing
+    return bool(own and own.second[row] in run.header.platform_nests and own.ends[0, row] < 0)
+
+
 def _label(run: Run, row: int) -> str:
     nests = run.header.platform_nests
-    if run.nest[row] not in nests or (run.sensing and run.sensing.second[row] in nests):
+    if run.nest[row] not in nests or _within(run, row):
         return ""
     return run.pose[row] or "q " + " ".join(f"{value:.4f}" for value in run.q[:, row])

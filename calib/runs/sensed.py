@@ -61,8 +61,22 @@ class Zero(NamedTuple):
     sigma: float
 
 
+class Blocks(NamedTuple):
+    """Blocks of one run.
+
+    Row (N,) of the reading; row (N,) at which the platform stood as it says; which are attitudes
+    and ghosts (N,); nests.
+    """
+
+    rows: IntArray
+    stood: IntArray
+    turn: BoolArray
+    ghost: BoolArray
+    nest: tuple[str, ...]
+
+
 _ARRAYS = (
-    "kind", "frame", "seen", "axis", "second", "plane", "zero", "attitude", "turn", "root",
+    "kind", "frame", "seen", "axis", "second", "plane", "zero", "attitude", "turn", "ghost", "root",
     "whitener", "turner",
 )  # fmt: skip
 
@@ -88,6 +102,10 @@ class Sensed:
         Which of ``planes`` and ``zeros``; -1 for none.
     attitude, turn : (3, 3, N), (N,) bool
         Of the platform in the instrument's frame, in the blocks that are an attitude.
+    ghost, partner : (N,) bool, (N,)
+        Blocks that only say where the other end of a distance between two poses stood; and the
+        ghost of each such distance, else -1. A ghost holds nothing: what it would say is folded
+        into its distance.
     root, whitener, turner : (3, 3, N)
         residual = root @ whitened; whitened = whitener @ residual + turner @ rotation, in mm or
         rad; zero where nothing is seen. The turner is zero but for attitudes.
@@ -103,6 +121,8 @@ class Sensed:
     zero: IntArray
     attitude: Array
     turn: BoolArray
+    ghost: BoolArray
+    partner: IntArray
     root: Array
     whitener: Array
     turner: Array
@@ -113,11 +133,24 @@ class Sensed:
 
     def take(self, chosen: IntArray) -> "Sensed":
         """Blocks selected by index."""
+        place = np.full(self.partner.size + 1, -1, dtype=np.intp)
+        place[chosen] = np.arange(chosen.size)
         return replace(
             self,
+            partner=place[self.partner[chosen]],
             second_name=tuple(self.second_name[row] for row in chosen),
             **{name: getattr(self, name)[..., chosen] for name in _ARRAYS},
         )
+
+    def fold(self, columns: Array) -> Array:
+        """Whitened columns (..., N) with what is of ghosts in their distances."""
+        far = np.flatnonzero(self.partner >= 0)
+        if far.size == 0:
+            return columns
+        out = columns.copy()
+        out[..., far] += columns[..., self.partner[far]]
+        out[..., self.ghost] = 0.0
+        return out
 
     @property
     def angular(self) -> BoolArray:
@@ -125,19 +158,21 @@ class Sensed:
         return np.isin(self.kind, ANGULAR) | self.turn
 
 
-def sensed(runs: Sequence[Run], blocks: Sequence[tuple[IntArray, BoolArray]]) -> Sensed | None:
-    """Blocks of several runs; None where all are plain points of one instrument a run.
-
-    ``blocks`` has for each run the rows (N,) of its blocks, and which of these are attitudes.
-    """
+def sensed(runs: Sequence[Run], blocks: Sequence[Blocks]) -> Sensed | None:
+    """Blocks of several runs; None where all are plain points of one instrument a run."""
     if all(run.sensing is None for run in runs):
         return None
     found = _Listed()
     parts = [
-        found.part(index, run, rows, turn)
-        for index, (run, (rows, turn)) in enumerate(zip(runs, blocks, strict=True))
+        found.part(index, run, own)
+        for index, (run, own) in enumerate(zip(runs, blocks, strict=True))
     ]
+    ghost = np.concatenate([part["ghost"] for part in parts])
+    partner = np.full(ghost.size, -1, dtype=np.intp)
+    at = np.flatnonzero(ghost)
+    partner[at - 1] = at
     return Sensed(
+        partner=partner,
         second_name=tuple(name for part in parts for name in part["second_name"]),
         frames=tuple(found.frames),
         planes=tuple(found.planes.values()),
@@ -156,8 +191,9 @@ class _Listed:
         self.zeros: list[Zero] = []
         self.nests: dict[str, SpreadNest] = {}
 
-    def part(self, index: int, run: Run, rows: IntArray, turn: BoolArray) -> dict[str, Any]:
+    def part(self, index: int, run: Run, blocks: Blocks) -> dict[str, Any]:
         """Arrays of one run's blocks."""
+        rows, turn, ghost = blocks.rows, blocks.turn, blocks.ghost
         setup = run.header.setup or Setup()
         self._nests(run, setup)
         sensing, count = run.sensing, rows.size
@@ -177,6 +213,7 @@ class _Listed:
                 "zero": np.full(count, -1, dtype=np.intp),
                 "attitude": np.repeat(np.eye(3)[:, :, None], count, axis=2),
                 "turn": turn,
+                "ghost": ghost,
                 "root": root,
                 "whitener": whitener,
                 "turner": turner,
@@ -185,12 +222,17 @@ class _Listed:
         root, whitener, turner = _whiteners(covariance, seen)
         _of_poses(sensing.spread[:, :, rows], kind == POSE, turn, (root, whitener, turner))
         instrument = [sensing.instrument[row] for row in rows]
-        second_name = tuple(sensing.second[row] for row in rows)
+        marks = sensing.ends[0, rows] >= 0
+        second_name = tuple(
+            "" if mark else sensing.second[row] for row, mark in zip(rows, marks, strict=True)
+        )
         nests = {**run.header.platform_nests, **run.header.base_nests, "": np.full(3, np.nan)}
         return {
             "kind": kind,
-            "frame": self._frame(index, setup, kind, instrument, second_name),
-            "seen": seen,
+            "frame": self._frame(
+                index, setup, kind, instrument, [sensing.second[row] for row in rows]
+            ),
+            "seen": seen & ~ghost,
             "axis": sensing.axis[:, rows],
             "second": np.array([nests[name] for name in second_name]).reshape(-1, 3).T,
             "second_name": second_name,
@@ -198,6 +240,7 @@ class _Listed:
             "zero": self._zero(index, setup, kind, instrument),
             "attitude": sensing.attitude[:, :, rows],
             "turn": turn,
+            "ghost": ghost,
             "root": root,
             "whitener": whitener,
             "turner": turner,
@@ -290,16 +333,24 @@ def _of_poses(
             root[:, :, row], whitener[:, :, row] = factor[:3, :3], inverse[:3, :3]
 
 
-def blocks_of(run: Run) -> tuple[IntArray, BoolArray]:
-    """Rows (N,) of a run's blocks in order, and which of them (N,) are attitudes."""
+def blocks_of(run: Run) -> Blocks:
+    """Blocks of a run in order: one a reading, two for a pose and for a distance of two poses."""
     rows = np.flatnonzero(run.measured)
+    none = np.zeros(rows.size, dtype=bool)
     if run.sensing is None:
-        return rows, np.zeros(rows.size, dtype=bool)
-    twice = np.where(run.sensing.kind[rows] == POSE, 2, 1)
+        return Blocks(rows, rows, none, none, tuple(run.nest[row] for row in rows))
+    marks = run.sensing.ends[0] >= 0
+    twice = np.where((run.sensing.kind[rows] == POSE) | marks[rows], 2, 1)
     out = np.repeat(rows, twice)
-    turn = np.zeros(out.size, dtype=bool)
-    turn[1:] = out[1:] == out[:-1]
-    return out, turn
+    second = np.zeros(out.size, dtype=bool)
+    second[1:] = out[1:] == out[:-1]
+    ghost = second & marks[out]
+    stood = np.where(marks[out], run.sensing.ends[np.where(ghost, 1, 0), out], out)
+    nest = tuple(
+        run.sensing.second[row] if other else run.nest[row]
+        for row, other in zip(out, ghost, strict=True)
+    )
+    return Blocks(out, stood.astype(np.intp), second & ~ghost, ghost, nest)
 
 
 def kind_words(kind: int, turn: bool) -> str:

@@ -80,6 +80,9 @@ class Sensing:
         Index in ``KINDS``.
     instrument, second, plane : tuple of N str
         Who measured; the other nest of a distance; the plane that was touched. Empty for none.
+    ends : (2, N)
+        Rows at which the two ends of a distance stood, for marks that were left at two poses; else
+        -1.
     seen : (3, N) bool
         Components that the row holds: x, y, z; azimuth, elevation; one value.
     axis : (3, N)
@@ -94,6 +97,7 @@ class Sensing:
     instrument: tuple[str, ...]
     second: tuple[str, ...]
     plane: tuple[str, ...]
+    ends: NDArray[np.intp]
     seen: NDArray[np.bool_]
     axis: Array
     attitude: Array

@@ -24,7 +24,7 @@ _ISO = re.compile(
     r"(\d{4})-?(\d\d)-?(\d\d)[T ](\d\d):?(\d\d)(?::?(\d\d(?:[.,]\d+)?))?"
     r"(Z|[+-]\d\d(?::?\d\d)?)?"
 )
-_LABELS = ("pose", "nest", "kind", "instrument", "nest2", "plane")
+_LABELS = ("pose", "nest", "kind", "instrument", "nest2", "plane", "pose2")
 _BASES = (
     (r"[xyz]|s[xyz]", "mm"), (r"s(xy|xz|yz)", "mm^2"), (r"time_s|delay_s", "s"), (r".*_C", "degC"),
     (r".*_kg", "kg"), (r"s?(azimuth|elevation|rx|ry|rz)", "rad"),

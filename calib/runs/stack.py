@@ -12,7 +12,7 @@ from calib.mechanism.description import Machine
 from calib.runs.commanded import CommandedPath, joined_paths
 from calib.runs.record import Run, holdout_folds
 from calib.runs.remark import Remark
-from calib.runs.sensed import BASE, FrameOf, Sensed, blocks_of, sensed
+from calib.runs.sensed import BASE, Blocks, FrameOf, Sensed, blocks_of, sensed
 from calib.runs.sensing import POINT, POSE
 
 STATES = ("q", "extension", "direction", "step", "time_s", "progress", "run", "path")
@@ -137,6 +137,10 @@ class Rows:
             return np.ones((3, self.count), dtype=bool)
         return self.sensed.seen
 
+    def folded(self, columns: Array) -> Array:
+        """Whitened columns (..., N) of the readings, the other ends of distances taken in."""
+        return columns if self.sensed is None else self.sensed.fold(columns)
+
     @cached_property
     def components(self) -> IntArray:
         """Number (N,) of components that each reading holds."""
@@ -168,7 +172,9 @@ class Rows:
         own = np.where(lengths, variance, np.inf)
         for run in np.unique(self.run):
             here = self.run == run
-            least = np.min(own[:, here], axis=0)
+            # Nests on the base may be next to exact: they make nothing else vague.
+            judging = here & self.on_platform if np.any(here & self.on_platform) else here
+            least = np.min(own[:, judging], axis=0)
             least = least[np.isfinite(least)]
             if least.size:
                 lengths[:, here] &= own[:, here] <= VAGUE**2 * np.median(least)
@@ -237,8 +243,8 @@ def stack(machine: Machine, runs: Sequence[Run]) -> Rows:
         raise BadInput("no run is given", remedy="Name at least one run's folder")
     blocks = [blocks_of(run) for run in runs]
     parts = [
-        _part(machine, run, index, rows)
-        for index, (run, (rows, _)) in enumerate(zip(runs, blocks, strict=True))
+        _part(machine, run, index, own)
+        for index, (run, own) in enumerate(zip(runs, blocks, strict=True))
     ]
     starts = np.cumsum([0, *(part.path.count for part in parts)])
     names = dict.fromkeys(name for run in runs for name in run.channels)
@@ -268,12 +274,12 @@ def stack(machine: Machine, runs: Sequence[Run]) -> Rows:
     )
 
 
-def _part(machine: Machine, run: Run, index: int, rows: IntArray) -> Rows:
-    """One run's readings in ``rows`` (N,), on the path of all its rows."""
+def _part(machine: Machine, run: Run, index: int, blocks: Blocks) -> Rows:
+    """One run's readings, on the path of all its rows."""
+    rows, stood = blocks.rows, blocks.stood
     extension = machine.extension(run.q, run.header.controller_parameters)
     motion = np.array([axis.motion for axis in machine.axes])
     nests = {**run.header.platform_nests, **run.header.base_nests}
-    names = tuple(run.nest[row] for row in rows)
     span = float(np.ptp(run.time_s))
     progress = (run.time_s - run.time_s[0]) / span if span > 0 else np.zeros_like(run.time_s)
     return Rows(
@@ -282,19 +288,19 @@ def _part(machine: Machine, run: Run, index: int, rows: IntArray) -> Rows:
         run=np.full(rows.size, index, dtype=np.intp),
         line=run.line[rows].astype(np.intp),
         pose_name=tuple(run.pose[row] for row in rows),
-        nest_name=names,
-        extension=extension[:, rows],
-        q=run.q[:, rows],
+        nest_name=blocks.nest,
+        extension=extension[:, stood],
+        q=run.q[:, stood],
         path=CommandedPath.of_run(extension, run.time_s, motion),
-        at=rows.astype(np.intp),
-        time_s=run.time_s[rows],
-        progress=progress[rows],
+        at=stood.astype(np.intp),
+        time_s=run.time_s[stood],
+        progress=progress[stood],
         position=run.position[:, rows],
         covariance=run.covariance[:, :, rows],
-        nest=np.array([nests[name] for name in names]).T,
+        nest=np.array([nests[name] for name in blocks.nest]).T,
         on_platform=_moving(run, rows),
         fold=holdout_folds(run)[rows].astype(np.intp),
-        channels={name: values[rows] for name, values in run.channels.items()},
+        channels={name: values[stood] for name, values in run.channels.items()},
     )
 
 
@@ -303,5 +309,6 @@ def _moving(run: Run, rows: IntArray) -> BoolArray:
     nests = run.header.platform_nests
     on = np.array([run.nest[row] in nests for row in rows], dtype=bool)
     if run.sensing is not None:
-        on ^= np.array([run.sensing.second[row] in nests for row in rows], dtype=bool)
+        other = np.array([run.sensing.second[row] in nests for row in rows], dtype=bool)
+        on ^= other & (run.sensing.ends[0, rows] < 0)
     return on

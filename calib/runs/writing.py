@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from calib.runs.header import FORMAT, Header
 from calib.runs.points import COVARIANCES, POSITION, SIGMAS
 from calib.runs.record import Run
+from calib.runs.writing_kinds import points_text, setup_table
 
 Array = NDArray[np.float64]
 
@@ -75,11 +76,18 @@ def format_header(header: Header) -> str:
             "platform_com": header.load.platform_com.tolist(),
             "payload_com": header.load.payload_com.tolist(),
         }
+    if header.setup is not None:
+        return setup_table(header.setup, table)
     return tomli_w.dumps(table)
 
 
 def format_points(run: Run, digits: Digits = EXACT) -> str:
-    """The text of ``points.csv``; covariances are written where any is not zero."""
+    """The text of ``points.csv``; covariances are written where any is not zero.
+
+    Runs of version 2 are written to the last bit, whatever ``digits`` say.
+    """
+    if run.sensing is not None:
+        return points_text(run, run.sensing)
     names, columns = _columns(run, digits)
     target = _Lines()
     writer = csv.writer(target, lineterminator="\n")

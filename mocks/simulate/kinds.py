@@ -51,12 +51,14 @@ class Laboratory:
     rows: list[dict[str, Any]] = field(default_factory=list)
     place: Array = field(default_factory=lambda: np.zeros(3))
     turn: Array = field(default_factory=lambda: np.eye(3))
+    _stood: dict[tuple[str, str], Array] = field(default_factory=dict)
     _pose: str = ""
     _q: Sequence[float] = ()
 
     def go(self, pose: str, q: Sequence[float], place: Array, turn: Array) -> None:
         """Stand at a pose: its label, commanded q, where the platform truly is."""
         self._pose, self._q, self.place, self.turn = pose, q, place, turn
+        self._stood |= {(nest, pose): self.where(nest) for nest in self.platform}
 
     def move(self) -> None:
         """Write that the machine was here, without a reading."""
@@ -105,6 +107,12 @@ class Laboratory:
         length = math.sqrt(float(apart @ apart)) + zero
         self._write("distance", by, nest, {"nest2": other, **self._scalar(length, sigma)})
 
+    def marks(self, nest: str, first: str, second: str, sigma: float, *, by: str = "") -> None:
+        """Read how far apart the marks are that a nest has left at two poses (calipers)."""
+        apart = self._stood[nest, first] - self._stood[nest, second]
+        cells = self._scalar(math.sqrt(float(apart @ apart)), sigma)
+        self._write("distance", by, nest, {"pose": first, "pose2": second, **cells})
+
     def angles(self, nest: str, sigma: float, *, by: str, only: str = "both") -> None:
         """Read azimuth and elevation in rad, or one of them."""
         x, y, z = self._stand(by).of(self.where(nest))
@@ -136,7 +144,18 @@ class Laboratory:
         """``run.toml`` and ``points.csv``."""
         used = [name for name in COLUMNS if any(name in row for row in self.rows)]
         q = [f"q{k + 1}" for k in range(self.actuators)]
-        names = ["time_s", "pose", "kind", "instrument", "nest", "nest2", "plane", *q, *used]
+        names = [
+            "time_s",
+            "pose",
+            "kind",
+            "instrument",
+            "nest",
+            "nest2",
+            "plane",
+            "pose2",
+            *q,
+            *used,
+        ]
         target = io.StringIO()
         writer = csv.DictWriter(target, names, restval="", lineterminator="\n")
         writer.writeheader()

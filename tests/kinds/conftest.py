@@ -110,6 +110,8 @@ def everything(
         lab.distance("p1", "anchor", 0.01, by="bar")
         lab.distance("b1", "p2", 0.01, by="bar")
         lab.tilt("p1", np.array([1.0, 0.0, 0.0]), 2e-5, by="level", zero=4e-4)
+    lab.marks("p1", "0", "2", 0.01, by="bar")
+    lab.marks("p3", "1", "2", 0.01, by="bar")
     lab.distance("p1", "p3", 0.002, by="bar")
     lab.distance("b2", "anchor", 0.01, by="bar")
     return lab

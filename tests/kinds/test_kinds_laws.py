@@ -6,6 +6,8 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
+from calib.discover.compare import compare_fit
+from calib.discover.compare_report import compare_report
 from calib.identify import fit
 from calib.model import Model
 from calib.runs.sensing import KINDS
@@ -103,3 +105,16 @@ def test_a_vague_component_says_as_little_as_a_missing_one(hexapod) -> None:
             assert rows.in_millimetres[:2].sum() == 0
     assert found[0].whitened[2] == pytest.approx(found[1].whitened[2], abs=1e-9)
     assert replace(found[0]).jacobian[:, 2] == pytest.approx(found[1].jacobian[:, 2], abs=1e-9)
+
+
+def test_nests_that_are_next_to_exact_make_nothing_else_vague(hexapod) -> None:
+    lab = everything(hexapod, seed=5, noise=0.0)
+    for row in lab.rows:
+        if row["nest"] in ("b1", "b2", "b3") and row["kind"] == "point":
+            row |= dict.fromkeys(("sx", "sy", "sz"), 1e-6)
+    rows = rows_of(hexapod, lab)
+    plain = rows.placed & rows.on_platform
+    assert plain.sum() >= 18
+    fitted = fit(Model(rows))
+    compare_report(compare_fit(fitted, np.random.default_rng(0)))
+    assert 1000.0 * fitted.noise_floor_mm < 30.0
