@@ -1,5 +1,6 @@
 """What was commanded at each row of a foreign table: actuators, poses, or a table of their own."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
 
@@ -9,7 +10,7 @@ from app.files.foreign_table import ForeignTable
 from app.files.import_columns import ALL_ACTUATORS, Numbers
 from app.files.import_map import Commanded, ImportMap
 from app.files.import_values import Reader
-from calib.arrays import Array
+from calib.arrays import Array, BoolArray
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import Poses
@@ -19,7 +20,10 @@ from calib.runs.header import Header
 
 @dataclass(frozen=True)
 class Row:
-    """One row of ``points.csv`` to be; ``position`` and ``covariance`` None for a move."""
+    """One row of ``points.csv`` to be; without a nest a move.
+
+    ``cells`` are the columns of a reading that is no point, by name.
+    """
 
     line: int
     place: str
@@ -31,6 +35,9 @@ class Row:
     position: Array | None
     covariance: Array | None
     channels: dict[str, float]
+    kind: str = "point"
+    instrument: str = ""
+    cells: Mapping[str, float] | None = None
 
 
 def told_by_pose(
@@ -72,31 +79,43 @@ def coordinates(reader: Reader, plan: ImportMap, machine: Machine, header: Heade
     return reader.numbers(wanted, units)
 
 
-def _from_poses(reader: Reader, wanted: Commanded, machine: Machine, header: Header) -> Array:
-    """What the controller commands for poses, by its own parameters."""
+def rotations_of(reader: Reader, wanted: Numbers, rotation: str, good: BoolArray) -> Array:
+    """Rotations (3, 3, N) by the numbers of a pose; the unit matrix where ``good`` is False.
+
+    Raises
+    ------
+    BadInput
+        For a quaternion that is not of norm 1.
+    """
     from scipy.spatial.transform import Rotation
 
-    place = reader.numbers(wanted.place_numbers)
-    turn = reader.numbers(wanted.turn_numbers).T
-    there = np.concatenate([place, turn.T])
-    good = np.asarray(np.isfinite(there).all(axis=0), dtype=bool)
+    turn = reader.numbers(wanted).T
     turn = np.where(good[:, None], turn, np.eye(1, turn.shape[1]))
-    if wanted.rotation == "rotation vector":
-        rotation = Rotation.from_rotvec(turn)
-    elif wanted.rotation.startswith("quaternion"):
+    if rotation == "rotation vector":
+        found = Rotation.from_rotvec(turn)
+    elif rotation.startswith("quaternion"):
         off = np.abs(np.linalg.norm(turn, axis=1) - 1.0)
         if off.max() > 1e-3:
             row = int(np.argmax(off))
-            at = reader.at(wanted.turn_numbers.columns[0], wanted.place)
+            at = reader.at(wanted.columns[0], wanted.place)
             raise BadInput(
                 f"the quaternion has the norm {np.linalg.norm(turn[row]):.6g}",
                 place=reader.table.place(row, at),
                 remedy="A rotation has a quaternion of norm 1: see the order of its columns",
             )
-        rotation = Rotation.from_quat(turn, scalar_first=wanted.rotation.endswith("wxyz"))
+        found = Rotation.from_quat(turn, scalar_first=rotation.endswith("wxyz"))
     else:
-        rotation = Rotation.from_euler(wanted.rotation, turn)
-    poses = Poses(np.where(good, place, 0.0), np.moveaxis(rotation.as_matrix(), 0, -1).copy())
+        found = Rotation.from_euler(rotation, turn)
+    return np.moveaxis(found.as_matrix(), 0, -1).copy()
+
+
+def _from_poses(reader: Reader, wanted: Commanded, machine: Machine, header: Header) -> Array:
+    """What the controller commands for poses, by its own parameters."""
+    place = reader.numbers(wanted.place_numbers)
+    there = np.concatenate([place, reader.numbers(wanted.turn_numbers)])
+    good = np.asarray(np.isfinite(there).all(axis=0), dtype=bool)
+    rotation = rotations_of(reader, wanted.turn_numbers, wanted.rotation, good)
+    poses = Poses(np.where(good, place, 0.0), rotation)
     found = inverse(machine, poses.take(good), machine.vector(header.controller_parameters))
     if not found.converged.all():
         row = int(np.flatnonzero(good)[np.argmin(found.converged)])

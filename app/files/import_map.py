@@ -6,11 +6,13 @@ column of ``points.csv`` comes from. Described in docs/import.md.
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from app.files.foreign_table import Column, Layout, layout_of
 from app.files.import_columns import Numbers, Text, columns_of, numbers_of, text_of
 from calib.runs.header import Header, contents_of
+from calib.runs.sensing import Setup
+from calib.runs.setup import setup_of
 from calib.toml_table import TomlTable
 from calib.units import Unit, unit_named
 
@@ -19,14 +21,24 @@ FORMS = ("s", "iso", "clock")
 """What times may be, besides a pattern of strptime."""
 TABLES = (
     "format", "machine", "title", "tracker", "nests", "controller", "load", "file", "time", "pose",
-    "nest", "station", "only", "actuators", "commanded_pose", "reading", "sigma", "channels",
-    "commands",
+    "nest", "instruments", "planes", "station", "only", "actuators", "commanded_pose", "reading",
+    "sigma", "channels", "commands",
 )  # fmt: skip
 """What a map may hold: what a run.toml has, and where the columns come from."""
-KINDS = ("xyz", "spherical")
+KINDS = ("xyz", "spherical", "angles", "pose")
 VERTICAL = ("elevation", "zenith")
 HORIZONTAL = ("counter-clockwise", "clockwise")
 ROTATIONS = ("quaternion wxyz", "quaternion xyzw", "rotation vector")
+
+
+@dataclass(frozen=True)
+class Commanded:
+    """Where the numbers of a pose stand, commanded or measured, and what its rotation is."""
+
+    place_numbers: Numbers
+    turn_numbers: Numbers
+    rotation: str
+    place: str
 
 
 @dataclass(frozen=True)
@@ -39,8 +51,9 @@ class Reading:
     distance_mm: float | None = None
     vertical: str = "elevation"
     horizontal: str = "counter-clockwise"
-    far: bool = False
-    """Directions of what is so far away that they are the same from everywhere: stars."""
+    instrument: str = ""
+    pose: Commanded | None = None
+    """Of a measured pose: where its numbers stand."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +67,8 @@ class Sigma:
     angle: float | None = None
     distance: float | None = None
     place: str = ""
+    sky: bool = False
+    """The angle is that of a direction: the azimuth's is larger by 1 / cos(elevation)."""
 
 
 @dataclass(frozen=True)
@@ -77,16 +92,6 @@ class Time:
 
 
 @dataclass(frozen=True)
-class Commanded:
-    """Commanded poses instead of actuator coordinates."""
-
-    place_numbers: Numbers
-    turn_numbers: Numbers
-    rotation: str
-    place: str
-
-
-@dataclass(frozen=True)
 class Commands:
     """A second table: what was commanded, by the label of the pose."""
 
@@ -96,12 +101,16 @@ class Commands:
 
 @dataclass(frozen=True)
 class ImportMap:
-    """A map as read; ``machine`` "" and ``header`` None where it names no machine and no nests."""
+    """A map as read; ``machine`` "" and ``header`` None where it names no machine and no nests.
+
+    ``setup`` is what it says of instruments and planes, None if nothing.
+    """
 
     source: str
     layout: Layout
     machine: str
     header: Header | None
+    setup: Setup | None
     time: Time
     pose: Text
     nest: Text | None
@@ -113,6 +122,11 @@ class ImportMap:
     sigma: Sigma
     channels: Mapping[str, Channel]
     commands: Commands | None
+
+    @property
+    def of_kinds(self) -> bool:
+        """Whether there are readings that version 1 of a run does not know."""
+        return any(reading.kind in ("angles", "pose") for reading in self.readings)
 
 
 def parse_map(text: str, source: str) -> ImportMap:
@@ -131,11 +145,14 @@ def map_of(top: TomlTable, source: str) -> ImportMap:
     top.format(FORMAT)
     top.only(*TABLES)
     machine = top.text("machine", "")
-    header = contents_of(top, None) if top.has("nests") else None
+    header = contents_of(top, None, of_kinds=True) if top.has("nests") else None
+    setup = setup_of(top, {}) if top.has("instruments") or top.has("planes") else None
+    if header is not None and header.setup is not None and not (header.setup.nests or setup):
+        header = replace(header, setup=None)  # nothing that version 1 cannot say
     layout = layout_of(top.table("file", required=False))
     actuators, commanded = _commanded(top)
     readings = tuple(_readings(top))
-    sigma = _sigma(top.table("sigma"), spherical=any(r.kind == "spherical" for r in readings))
+    sigma = _sigma(top.table("sigma"), readings[0].kind)
     nest = text_of(top, "nest")
     if nest is None and not all(reading.nest for reading in readings):
         raise top.wrong(
@@ -161,6 +178,7 @@ def map_of(top: TomlTable, source: str) -> ImportMap:
         layout,
         machine,
         header,
+        setup,
         _time(top.table("time")),
         pose,
         nest,
@@ -195,6 +213,13 @@ def _commanded(top: TomlTable) -> tuple[Numbers | None, Commanded | None]:
         table.end()
         return actuators, None
     table = top.table("commanded_pose")
+    pose = _pose(table)
+    table.end()
+    return None, pose
+
+
+def _pose(table: TomlTable) -> Commanded:
+    """Read where the numbers of a pose stand, and what its rotation is."""
     rotation = table.text("rotation")
     angles = re.fullmatch(r"[xyz]{3}|[XYZ]{3}", rotation) and rotation[1] not in rotation[::2]
     if rotation not in ROTATIONS and not angles:
@@ -211,9 +236,9 @@ def _commanded(top: TomlTable) -> tuple[Numbers | None, Commanded | None]:
         rotation,
         table.place(),
     )
-    for one in (table, place, turn):
+    for one in (place, turn):
         one.end()
-    return None, found
+    return found
 
 
 def _readings(top: TomlTable) -> list[Reading]:
@@ -221,10 +246,15 @@ def _readings(top: TomlTable) -> list[Reading]:
     for table in top.tables("reading"):
         kind = table.choice("kind", KINDS, "xyz")
         nest = table.text("nest", "")
+        instrument = table.text("instrument", "")
         if kind == "xyz":
-            found.append(Reading(kind, numbers_of(table, 3, ("mm",)), nest))
+            read = Reading(kind, numbers_of(table, 3, ("mm",)), nest)
+        elif kind == "pose":
+            pose = _pose(table)
+            read = Reading(kind, pose.place_numbers, nest, pose=pose)
         else:
-            found.append(_spherical(table, nest))
+            read = _spherical(table, kind, nest)
+        found.append(replace(read, instrument=instrument))
         table.end()
         if found[-1].kind != found[0].kind:
             raise table.wrong(
@@ -238,29 +268,47 @@ def _readings(top: TomlTable) -> list[Reading]:
     return found
 
 
-def _spherical(table: TomlTable, nest: str) -> Reading:
+def _spherical(table: TomlTable, kind: str, nest: str) -> Reading:
     distance = None
-    if table.has("distance"):
+    if kind == "spherical" and table.has("distance"):
         distance = table.quantity("distance", "mm", 0.0)
         if not distance > 0.0:
             raise table.wrong("a distance of zero has no direction", "distance")
-    count = 3 if distance is None else 2
+    count = 3 if kind == "spherical" and distance is None else 2
     return Reading(
-        "spherical",
+        kind,
         numbers_of(table, count, ("rad", "rad", "mm")[:count]),
         nest,
         distance,
         table.choice("vertical", VERTICAL),
         table.choice("horizontal", HORIZONTAL),
-        table.flag("far", False),
     )
 
 
-def _sigma(table: TomlTable, *, spherical: bool) -> Sigma:
+def _sigma(table: TomlTable, kind: str) -> Sigma:
     """What a reading's uncertainty is; raises BadInput where nothing states it."""
     coverage = table.number("coverage", 1.0, above=0.0)
     place = table.place()
-    if spherical:
+    if kind == "pose":
+        value = table.quantity("place", "mm", 0.0, least=0.0)
+        turn = table.quantity("turn", "rad", 0.0, least=0.0)
+        if value <= 0.0 or turn <= 0.0:
+            raise table.wrong(
+                "place and attitude need an uncertainty each", "place",
+                remedy='Write place = "20 um" and turn = "0.002 deg"',
+            )  # fmt: skip
+        table.end()
+        return Sigma(None, coverage, value, 0.0, turn, None, place)
+    if kind == "angles":
+        angle = table.quantity("angle", "rad", 0.0, least=0.0)
+        if angle <= 0.0:
+            raise table.wrong(
+                "directions need an uncertainty", "angle", remedy='Write angle = "0.0003 deg"'
+            )
+        sky = table.flag("sky", False)
+        table.end()
+        return Sigma(None, coverage, None, 0.0, angle, None, place, sky)
+    if kind == "spherical":
         angle = table.quantity("angle", "rad", 0.0, least=0.0)
         distance = table.quantity("distance", "mm", 0.0, least=0.0)
         if angle <= 0.0 or distance <= 0.0:

@@ -214,6 +214,17 @@ def positions(reader: Reader, reading: Reading, sigma: Sigma) -> tuple[Array, Ar
     return radius * along, covariance
 
 
+def angles(reader: Reader, reading: Reading, sigma: Sigma) -> dict[str, Array]:
+    """Columns (N,) of a reading of azimuth and elevation, rad; nan where the row holds none."""
+    values = reader.numbers(reading.numbers)
+    turn = values[0] * (1.0 if reading.horizontal == "counter-clockwise" else -1.0)
+    rise = values[1] if reading.vertical == "elevation" else 0.5 * np.pi - values[1]
+    assert sigma.angle is not None
+    spread = np.full(values.shape[1], sigma.angle / sigma.coverage)
+    wide = spread / np.maximum(np.cos(rise), 1e-6) if sigma.sky else spread
+    return {"azimuth": turn, "elevation": rise, "sazimuth": wide, "selevation": spread}
+
+
 def _outer(v: Array) -> Array:
     return np.asarray(v[:, None] * v[None, :])
 

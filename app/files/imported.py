@@ -1,5 +1,6 @@
 """Foreign tables as the rows of runs, by a map; everything that was assumed is listed."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -8,19 +9,27 @@ from itertools import pairwise
 import numpy as np
 
 from app.files.foreign_table import ForeignTable
-from app.files.import_commands import Row, coordinates, told_by_pose, with_commands
-from app.files.import_map import ImportMap
-from app.files.import_values import Reader, positions, seconds_from_start, times
+from app.files.import_commands import (
+    Row,
+    coordinates,
+    rotations_of,
+    told_by_pose,
+    with_commands,
+)
+from app.files.import_map import ImportMap, Reading
+from app.files.import_values import Reader, angles, positions, seconds_from_start, times
+from app.files.imported_kinds import points_text
 from calib.arrays import Array
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
+from calib.mechanism.rigid import to_euler
 from calib.runs.header import Header
+from calib.runs.points import parse_points
 from calib.runs.record import Run
+from calib.runs.sensing import Setup
 
-CENTRE = "centre"
-"""Reference nest in the machine's origin, for directions of what is far away."""
-FAR_MM = 1000.0
-_PIN_MM = 2e-3
+_NOTHING = Row(0, "", 0.0, "", "", "", np.zeros(0), None, None, {})
+"""A row of which nothing is known yet."""
 
 
 @dataclass
@@ -34,6 +43,8 @@ class Imported:
     runs: dict[str, Run]
     assumed: list[str] = field(default_factory=list)
     lines_of_file: bool = True
+    points: dict[str, str] = field(default_factory=dict)
+    """Text of points.csv by station, where a run is of version 2."""
 
 
 def imported(
@@ -58,12 +69,6 @@ def imported(
         With file, line and column.
     """
     notes: list[str] = []
-    if any(reading.far for reading in plan.readings):
-        header = replace(header, base_nests={**header.base_nests, CENTRE: np.zeros(3)})
-        notes.append(
-            f"directions are the same from everywhere: the station stands in the machine's origin "
-            f'(nest "{CENTRE}")'
-        )
     told = None if commands is None else told_by_pose(commands, plan, machine, header, notes)
     rows: list[Row] = []
     for table in tables:
@@ -75,11 +80,22 @@ def imported(
     stations = list(dict.fromkeys(row.station for row in rows))
     if plan.time.step_s:
         notes.append(f"the file holds no times: rows are {plan.time.step_s:g} s apart")
-    runs = {
-        station: _run([row for row in rows if row.station == station], header, tables, plan)
-        for station in stations
-    }
-    return Imported(runs, list(dict.fromkeys(notes)), len(tables) == 1)
+    runs, points = {}, {}
+    for station in stations:
+        own = [row for row in rows if row.station == station]
+        runs[station] = _run(own, header, tables, plan)
+        if header.setup is not None or plan.of_kinds:
+            time_s = runs[station].time_s
+            points[station] = points_text(own, time_s, tuple(plan.channels))
+            runs[station] = _of_kinds(points[station], runs[station], machine)
+    return Imported(runs, list(dict.fromkeys(notes)), len(tables) == 1, points)
+
+
+def _of_kinds(text: str, run: Run, machine: Machine) -> Run:
+    """The run of version 2 as its file will be read, with the lines of the foreign file."""
+    header = run.header if run.header.setup else replace(run.header, setup=Setup())
+    found = parse_points(text, header, actuators=len(machine.actuators), source=run.source)
+    return replace(found, line=run.line)
 
 
 class _Rows:
@@ -110,7 +126,7 @@ class _Rows:
         if plan.pose.each_row:
             poses = [str(line) for line in table.lines]
         nests = reader.labels(plan.nest) if plan.nest else [""] * count
-        read = [(one.nest, *positions(reader, one, plan.sigma)) for one in plan.readings]
+        read = [self._read(one) for one in plan.readings]
         q = self._commands(poses)
         channels = self._channels()
         self._say_what_is_left()
@@ -128,33 +144,65 @@ class _Rows:
                 covariance=None,
                 channels={name: float(values[row]) for name, values in channels.items()},
             )
-            found = [
-                replace(
-                    move,
-                    pose="" if (nest or nests[row]) in self.header.base_nests else poses[row],
-                    nest=self._nest(row, nest or nests[row]),
-                    position=position[:, row] + (FAR_MM * np.eye(3)[0] if self._far else 0.0),
-                    covariance=covariance[:, :, row],
-                )
-                for nest, position, covariance in read
-                if self._is_there(row, position[:, row])
-            ]
+            found = []
+            for reading, held in zip(plan.readings, read, strict=True):
+                part, nest = held[row], reading.nest or nests[row]
+                if part is not None:
+                    found.append(
+                        replace(
+                            move,
+                            pose="" if nest in self.header.base_nests else poses[row],
+                            nest=self._nest(row, nest),
+                            position=part.position,
+                            covariance=part.covariance,
+                            cells=part.cells,
+                            kind=part.kind,
+                            instrument=reading.instrument,
+                        )
+                    )
             rows += found or [move]
-        return [*self._pin(rows), *rows]
+        return rows
 
-    @property
-    def _far(self) -> bool:
-        return any(reading.far for reading in self.plan.readings)
+    def _pose_cells(self, reading: Reading) -> dict[str, Array]:
+        """Columns (N,) of a measured pose; nan where the row holds none."""
+        pose, sigma = reading.pose, self.plan.sigma
+        assert pose is not None
+        assert sigma.value is not None
+        assert sigma.angle is not None
+        place = self.reader.numbers(pose.place_numbers)
+        there = np.concatenate([place, self.reader.numbers(pose.turn_numbers)])
+        good = np.asarray(np.isfinite(there).all(axis=0), dtype=bool)
+        turns = to_euler(rotations_of(self.reader, pose.turn_numbers, pose.rotation, good))
+        values = np.where(good, np.concatenate([place, turns]), np.nan)
+        spread = [sigma.value / sigma.coverage, sigma.angle / sigma.coverage]
+        cells = dict(zip(("x", "y", "z", "rx", "ry", "rz"), values, strict=True))
+        return cells | {
+            f"s{name}": np.full(good.size, spread[name.startswith("r")]) for name in cells
+        }
 
-    def _pin(self, rows: list[Row]) -> list[Row]:
-        """The station in the machine's origin, where that is what directions mean."""
-        if not self._far or not rows:
-            return []
-        pinned = replace(
-            rows[0], pose="", nest=CENTRE, position=FAR_MM * np.eye(3)[0],
-            covariance=_PIN_MM**2 * np.eye(3),
-        )  # fmt: skip
-        return [pinned]
+    def _read(self, reading: Reading) -> "list[Row | None]":
+        """What each row holds of one reading, as parts of rows; None where there is nothing."""
+        count = len(self.table.rows)
+        if reading.kind in ("xyz", "spherical"):
+            position, covariance = positions(self.reader, reading, self.plan.sigma)
+            return [
+                replace(_NOTHING, position=position[:, row], covariance=covariance[:, :, row])
+                if self._is_there(row, position[:, row])
+                else None
+                for row in range(count)
+            ]
+        columns = (
+            angles(self.reader, reading, self.plan.sigma)
+            if reading.kind == "angles"
+            else self._pose_cells(reading)
+        )
+        cells = [{name: float(v[row]) for name, v in columns.items()} for row in range(count)]
+        return [
+            replace(_NOTHING, cells=one, kind=reading.kind)
+            if all(map(math.isfinite, one.values()))
+            else None
+            for one in cells
+        ]
 
     def _chosen(self) -> list[int]:
         count = len(self.table.rows)

@@ -116,8 +116,21 @@ def write_run(
     A folder that holds a run already is refused (BadInput), or its run is replaced. ``beside`` are
     more tables of run.toml, which no reader asks for.
     """
+    header, points = format_run(run, digits)
+    write_texts(folder, header, points, replace=replace, beside=beside)
+
+
+def write_texts(
+    folder: Path,
+    header: str,
+    points: str,
+    *,
+    replace: bool = False,
+    beside: Mapping[str, Any] | None = None,
+) -> None:
+    """Write the texts of run.toml and points.csv, see :func:`write_run`."""
     folder.mkdir(parents=True, exist_ok=True)
-    texts = dict(zip((HEADER, POINTS), format_run(run, digits), strict=True))
+    texts = {HEADER: header, POINTS: points}
     if beside:
         texts[HEADER] += "\n" + tomli_w.dumps(beside)
     for name in texts:

@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
@@ -13,8 +14,9 @@ import numpy as np
 from app.files.foreign_table import read_foreign
 from app.files.import_map import ImportMap, parse_map
 from app.files.imported import Imported, imported
+from app.files.imported_kinds import header_text
 from app.files.machines import load_machine, shipped_machines
-from app.files.runs import POINTS, write_run
+from app.files.runs import POINTS, write_run, write_texts
 from app.files.shipped_maps import shipped_map
 from app.files.text import read_text
 from app.jobs.chosen_runs import File, Runs, names_of, path_of
@@ -30,6 +32,7 @@ from calib.runs import format_run, parse_header, parse_run
 from calib.runs.header import Header
 from calib.runs.record import Run
 from calib.runs.remark import Remark, plain_remarks
+from calib.runs.sensing import Setup
 
 MAP_COPY = "import-map.toml"
 _WHERE = {
@@ -108,8 +111,9 @@ def import_run(
     plan = parse_map(text, source)
     head, described, base = _header(plan, machine, path_of(header), folder)
     found = _read(names, path_of(commands), plan, described, head)
-    for one in found.runs.values():
-        _prove(one, described)
+    for station, one in found.runs.items():
+        if station not in found.points:
+            _prove(one, described)
     assumed = [*found.assumed, *_assumed_of_map(plan, found)]
     looked = [one if found.lines_of_file else _lines_of_run(one) for one in found.runs.values()]
     remarks = _looked(described, looked, plan, as_it_stands=as_it_stands)
@@ -117,8 +121,13 @@ def import_run(
     folders = []
     for station, one in found.runs.items():
         place = out / _folder_name(station) if len(found.runs) > 1 else out
-        named = replace(one.header, machine=_named_from(place, head.machine, base))
-        write_run(place, replace(one, header=named), beside={"imported": said})
+        named = _named_from(place, head.machine, base)
+        if station in found.points:
+            top = header_text(named, _tables(text, path_of(header)))
+            write_texts(place, top, found.points[station], beside={"imported": said})
+        else:
+            known = replace(one, header=replace(one.header, machine=named))
+            write_run(place, known, beside={"imported": said})
         (place / MAP_COPY).write_text(text, encoding="utf-8", newline="\n")
         folders.append(str(place))
     poses = {
@@ -149,6 +158,18 @@ def _map_text(name: str | File) -> tuple[str, str, Path | None]:
     return shipped_map(str(name)), f"{name}.toml (shipped)", None
 
 
+def _tables(text: str, header: Path | None) -> dict[str, Any]:
+    """What run.toml takes over as it stands: of the header's file, and of the map."""
+    own = tomllib.loads(text)
+    if header is None:
+        return own
+    said = tomllib.loads(read_text(header))
+    for key in ("instruments", "planes"):
+        if key in own:
+            said[key] = {**said.get(key, {}), **own[key]}
+    return said
+
+
 def _header(
     plan: ImportMap, machine: str | None, file: Path | None, folder: Path | None
 ) -> tuple[Header, Machine, Path | None]:
@@ -166,12 +187,17 @@ def _header(
             remedy="Add machine, [nests.platform] and [nests.base] as in a run.toml, or name a "
             "run.toml that has them with --header",
         )  # fmt: skip
+    if plan.setup is not None and file is not None:
+        known = head.setup or Setup()
+        instruments = {**known.instruments, **plan.setup.instruments}
+        planes = {**known.planes, **plan.setup.planes}
+        head = replace(head, setup=Setup(instruments, planes, known.nests))
     if machine is not None:
         head, folder = replace(head, machine=machine), None
     described = load_machine(head.machine, folder)
-    known = {parameter.name for parameter in described.parameters}
+    parameters = {parameter.name for parameter in described.parameters}
     for name in head.controller_parameters:
-        if name not in known:
+        if name not in parameters:
             raise BadInput(f"the machine has no parameter {name!r}", place=plan.source)
     return head, described, folder
 

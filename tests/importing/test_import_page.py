@@ -65,8 +65,36 @@ columns = [1, 2, 3]
 [sigma]
 columns = [1, 2, 3]
 """,
+    BEGIN.format(time="step_s = 1.0")
+    + """
+[actuators]
+columns = 1
+[[reading]]
+kind = "pose"
+rotation = "XYZ"
+place = { columns = [1, 2, 3] }
+turn = { columns = [1, 2, 3] }
+[sigma]
+place = "1 mm"
+turn = "1 deg"
+""",
+    BEGIN.format(time="step_s = 1.0")
+    + """
+[actuators]
+columns = 1
+[[reading]]
+kind = "angles"
+columns = [1, 2]
+vertical = "zenith"
+horizontal = "clockwise"
+[sigma]
+angle = "1 deg"
+""",
 )
-SHARED = r"(?!actuators).*\.(unit|sign|gear|scale|offset)|commands\.(file\..*|pose\.(?!column).*)"
+SHARED = (
+    r"(instruments|planes)\..*|(?!actuators).*\.(unit|sign|gear|scale|offset)|"
+    r"commands\.(file\..*|pose\.(?!column).*)"
+)
 """Keys that the page names once for all tables."""
 
 

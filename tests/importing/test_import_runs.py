@@ -28,7 +28,8 @@ def unlooked(bench: Bench, table: Path, plan: Path) -> Run:
     """The run of a table, before anything is asked of it."""
     read = parse_map(plan.read_text(), str(plan))
     foreign = read_foreign(table, read.layout)
-    found = imported([foreign], None, read, bench.loaded.machine, bench.run.header)
+    header = bench.run.header if read.setup is None else replace(bench.run.header, setup=read.setup)
+    found = imported([foreign], None, read, bench.loaded.machine, header)
     return found.runs[""]
 
 
@@ -104,7 +105,7 @@ def test_the_plain_table_ships_too(bench, tmp_path) -> None:
 def test_shipped_maps_are_read_and_say_what_they_assume(name: str) -> None:
     text = shipped_map(name)
     assert parse_map(text, name).readings
-    assert "Name the machine" in text or "name it" in text
+    assert "--header" in text
 
 
 def test_commanded_poses_become_what_the_machine_needs_for_them(bench, tmp_path) -> None:
@@ -140,6 +141,58 @@ def test_commanded_poses_become_what_the_machine_needs_for_them(bench, tmp_path)
         (tmp_path / "map.toml").write_text(plan)
         found = unlooked(bench, tmp_path / "a.csv", tmp_path / "map.toml")
         assert same(found, run, tolerance=1e-6), order
+
+
+@pytest.mark.parametrize("rotation", ["zyx", "quaternion xyzw", "rotation vector"])
+def test_measured_poses_and_directions_make_a_run_of_version_2(bench, tmp_path, rotation) -> None:
+    """A 6-D probe and a theodolite in the base's frame: numbers in the units of their programs."""
+    from scipy.spatial.transform import Rotation
+
+    run, machine = bench.run, bench.loaded.machine
+    posed = [k for k in np.flatnonzero(run.measured) if run.nest[k] == "p1"]
+    poses = forward(machine, machine.extension(run.q)).poses
+    nest = poses.points(run.header.platform_nests["p1"][:, None])
+    turned = Rotation.from_matrix(np.moveaxis(poses.rotation, -1, 0))
+    turns = {
+        "zyx": np.degrees(turned.as_euler("zyx")),
+        "quaternion xyzw": turned.as_quat(),
+        "rotation vector": np.degrees(turned.as_rotvec()),
+    }[rotation]
+    names = [f"t{k}" for k in range(turns.shape[1])]
+    lines = [f"pose,q1[mm],q2[mm],q3[mm],X[m],Y[m],Z[m],{','.join(names)},hz[gon],v[gon]"]
+    for k in posed:
+        x, y, z = nest[:, k]
+        circles = np.array([np.arctan2(x, y), np.arccos(z / np.linalg.norm(nest[:, k]))])
+        cells = [*run.q[:, k], *(nest[:, k] / 1e3), *turns[k], *(circles * 200.0 / np.pi)]
+        lines.append(f"{run.pose[k]}," + ",".join(f"{value:.12g}" for value in cells))
+    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n")
+    head = (
+        'format = "pkm-import/1"\n[time]\nstep_s = 1.0\n[pose]\ncolumn = "pose"\n'
+        '[actuators]\ncolumns = "q*"\n[instruments.base]\nframe = "base"\n'
+    )
+    unit = "" if rotation.startswith("quat") else ', unit = "deg"'
+    (tmp_path / "pose.toml").write_text(
+        head + '[[reading]]\nkind = "pose"\nnest = "p1"\ninstrument = "base"\n'
+        f'rotation = "{rotation}"\nplace = {{ columns = ["X", "Y", "Z"] }}\n'
+        f"turn = {{ columns = {names}{unit} }}\n"
+        '[sigma]\nplace = "20 um"\nturn = "0.002 deg"\n'
+    )
+    (tmp_path / "angles.toml").write_text(
+        head + '[[reading]]\nkind = "angles"\nnest = "p1"\ninstrument = "base"\n'
+        'columns = ["hz", "v"]\nvertical = "zenith"\nhorizontal = "clockwise"\n'
+        '[sigma]\nangle = "0.001 deg"\n'
+    )
+    found = unlooked(bench, tmp_path / "a.csv", tmp_path / "pose.toml")
+    assert found.sensing is not None
+    assert np.allclose(found.position, nest[:, posed], atol=1e-6)
+    assert np.allclose(found.sensing.attitude, poses.rotation[:, :, posed], atol=1e-9)
+    assert np.allclose(np.diag(found.sensing.spread[:, :, 0])[3:], np.radians(0.002) ** 2)
+    brought(bench, tmp_path / "a.csv", tmp_path / "angles.toml", tmp_path / "run")
+    found = read_run(tmp_path / "run").run
+    x, y, z = nest[:, posed]
+    clockwise = np.arctan2(y, x) - 0.5 * np.pi
+    assert np.allclose(np.angle(np.exp(1j * (found.position[0] - clockwise))), 0.0, atol=1e-9)
+    assert np.allclose(found.position[1], np.arctan2(z, np.hypot(x, y)), atol=1e-9)
 
 
 def test_gears_signs_zeros_and_counts(bench, tmp_path) -> None:
