@@ -13,15 +13,19 @@ from calib.identify import Fit
 from calib.identify.readings import BadReading
 from calib.model.prediction import Model
 from calib.model.state import Linearised
+from calib.runs.sensed import kind_words
+from calib.runs.stack import Rows
 
 LACKS = "lacks a channel that an effect needs"
 HEADER = (
     "run", "line", "pose", "nest", "on", "time_s",
     "x_mm", "y_mm", "z_mm", "dx_um", "dy_um", "dz_um", "distance_um",
-    "base_dx_um", "base_dy_um", "base_dz_um", "sigmas", "left_out",
+    "base_dx_um", "base_dy_um", "base_dz_um", "sigmas", "left_out", "kind",
 )  # fmt: skip
 """Columns: where the reading stands; what was read, and measured minus predicted in the tracker
-frame; the same along the axes of the base frame; in stated sigmas; why it was left out."""
+frame; the same along the axes of the base frame; in stated sigmas; why it was left out; the kind.
+Readings that are no points have their components in x, y, z as the run has them, in mm and um, or
+rad and urad, and none along the axes of the base; components that they lack are empty."""
 
 
 def write_residuals(
@@ -58,7 +62,9 @@ def residuals_text(model: Model, linear: Linearised, why: dict[int, str]) -> str
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(HEADER)
     for k in range(rows.count):
-        off = 1000.0 * linear.residual[:, k]
+        angular = rows.sensed is not None and bool(rows.sensed.angular[k])
+        live = rows.live[:, k]
+        off = np.where(live, (1e6 if angular else 1e3) * linear.residual[:, k], np.nan)
         writer.writerow(
             [
                 rows.runs[rows.run[k]].source,
@@ -67,16 +73,26 @@ def residuals_text(model: Model, linear: Linearised, why: dict[int, str]) -> str
                 rows.nest_name[k],
                 "platform" if rows.on_platform[k] else "base",
                 f"{rows.time_s[k]:.10g}",
-                *(f"{value:.7g}" for value in rows.position[:, k]),
+                *(
+                    f"{value:.9g}" if held else ""
+                    for value, held in zip(rows.position[:, k], live, strict=True)
+                ),
                 *_um(off),
-                *_um(np.array([np.linalg.norm(off)])),
-                *_um(1000.0 * in_base[:, k]),
+                *_um(np.array([np.linalg.norm(off[live])])),
+                *_um(1000.0 * in_base[:, k] if rows.placed[k] else np.full(3, np.nan)),
                 f"{np.linalg.norm(linear.whitened[:, k]):.4g}",
                 why.get(k, ""),
+                _kind(rows, k),
             ]
         )
     return text.getvalue()
 
 
 def _um(values: Array) -> list[str]:
-    return [f"{value:.4f}" for value in values]
+    return ["" if np.isnan(value) else f"{value:.4f}" for value in values]
+
+
+def _kind(rows: Rows, k: int) -> str:
+    if rows.sensed is None:
+        return "point"
+    return kind_words(int(rows.sensed.kind[k]), bool(rows.sensed.turn[k]))

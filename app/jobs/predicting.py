@@ -1,6 +1,7 @@
 """Ask a saved model what it says of readings that it has not seen."""
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +21,7 @@ from calib.identify.predicting import Known, Prediction, shift_of_frames
 from calib.identify.predicting import predict as predicted
 from calib.model.prediction import Model
 from calib.runs.remark import plain_remarks
+from calib.runs.stack import Rows
 
 WORST = 8
 """Readings that are named as the worst."""
@@ -171,8 +173,9 @@ def _known(
     """Values and covariance in the model's order; names of unknowns that the file lacks."""
     names = list(saved.estimates)
     at = [_place_in(saved, name, model, frame) for name in model.names]
-    values = np.concatenate([model.centre[: model.free.size], *model.effects_at_rest])
-    values = np.concatenate([values, np.zeros(6 * model.frames)])
+    values = model.centre.copy()  # of what the file lacks
+    at_rest = np.concatenate([np.zeros(0), *model.effects_at_rest])
+    values[model.free.size : model.free.size + at_rest.size] = at_rest
     select = np.zeros((len(at), len(names)))
     lacking = []
     own = np.zeros(len(at))
@@ -202,7 +205,7 @@ def _place_in(saved: SavedFit, name: str, model: Model, frame: bool) -> str | No
         return name if name in saved.estimates else None
     if frame:
         return None
-    one = f"frame.{name.rpartition('.')[2]}"
+    one = re.sub(r"^run\d+\.", "", name)
     if one not in saved.estimates:
         raise BadInput(
             "the model was fitted to several runs: it has no one place of the tracker",
@@ -236,10 +239,11 @@ def _said(
     saved: SavedFit, found: Prediction, lacking: tuple[str, ...], remarks: list[str]
 ) -> dict[str, Any]:
     rows, accepted = found.model.rows, found.accepted
-    judged = accepted & rows.on_platform
-    judged = judged if judged.any() else accepted
+    told = accepted & rows.in_millimetres.any(axis=0)
+    judged = told & rows.on_platform
+    judged = judged if judged.any() else told
     rms, expected = _rms(found, judged)
-    noise = _root_um(np.einsum("iin->n", rows.covariance)[judged])
+    noise = _root_um(np.sum(_in_mm2(rows.covariance, rows), axis=0)[judged])
     moved = [] if found.refitted else _frame_words(found)
     log_p = found.log_p
     return {
@@ -256,7 +260,7 @@ def _said(
         "chi2_per_dof": found.chi2 / found.dof if found.dof > 0 else None,
         "log10_p": log_p / math.log(10.0),
         "p_value": math.exp(log_p),
-        "axes": [_axis(found, judged, k) for k in range(3)],
+        "axes": [_axis(found, judged & rows.placed, k) for k in range(3)],
         "nests": [_nest(found, *nest) for nest in _nests(found)],
         "worst": _worst(found),
         "not_in_model": list(lacking),
@@ -272,9 +276,15 @@ def _root_um(squares: Array) -> float:
     return 1000.0 * float(np.sqrt(np.mean(squares))) if squares.size else math.nan
 
 
+def _in_mm2(covariance: Array, rows: Rows) -> Array:
+    """Variances (3, N) of the components that say something in mm; zero for the others."""
+    return np.asarray(np.einsum("iin->in", covariance) * rows.in_millimetres)
+
+
 def _rms(found: Prediction, which: BoolArray) -> tuple[float, float]:
-    squares = np.sum(found.linear.residual**2, axis=0)
-    allowed = np.einsum("iin->n", found.covariance)
+    rows = found.model.rows
+    squares = np.sum(found.linear.residual**2 * rows.in_millimetres, axis=0)
+    allowed = np.sum(_in_mm2(found.covariance, rows), axis=0)
     return _root_um(squares[which]), _root_um(allowed[which])
 
 
@@ -291,9 +301,8 @@ def _axis(found: Prediction, which: BoolArray, k: int) -> dict[str, Any]:
 def _nests(found: Prediction) -> list[tuple[str, bool]]:
     """Nests that were read, those of the platform first."""
     rows = found.model.rows
-    read = dict.fromkeys(
-        (rows.nest_name[k], bool(rows.on_platform[k])) for k in np.flatnonzero(found.accepted)
-    )
+    told = np.flatnonzero(found.accepted & rows.in_millimetres.any(axis=0))
+    read = dict.fromkeys((rows.nest_name[k], bool(rows.on_platform[k])) for k in told)
     return sorted(read, key=lambda one: not one[1])
 
 
@@ -301,6 +310,7 @@ def _nest(found: Prediction, nest: str, on_platform: bool) -> dict[str, Any]:
     rows = found.model.rows
     named = np.array([name == nest for name in rows.nest_name])
     which = found.accepted & named & (rows.on_platform == on_platform)
+    which &= rows.in_millimetres.any(axis=0)
     rms, expected = _rms(found, which)
     return {
         "nest": nest,
@@ -313,9 +323,11 @@ def _nest(found: Prediction, nest: str, on_platform: bool) -> dict[str, Any]:
 
 def _worst(found: Prediction) -> list[dict[str, Any]]:
     rows = found.model.rows
-    inverse = np.linalg.inv(np.moveaxis(found.covariance, -1, 0))
     residual = found.linear.residual
-    times = np.sqrt(np.maximum(np.einsum("in,nij,jn->n", residual, inverse, residual) / 3.0, 0.0))
+    inverse = np.linalg.pinv(np.moveaxis(found.covariance, -1, 0), hermitian=True)
+    squares = np.einsum("in,nij,jn->n", residual, inverse, residual)
+    times = np.sqrt(np.maximum(squares / np.maximum(rows.components, 1), 0.0))
+    lengths = residual * rows.in_millimetres
     order = [k for k in np.argsort(-times) if found.accepted[k]][:WORST]
     return [
         {
@@ -323,12 +335,20 @@ def _worst(found: Prediction) -> list[dict[str, Any]]:
             "line": int(rows.line[k]),
             "pose": rows.pose_name[k],
             "nest": rows.nest_name[k],
-            "shift_um": [1000.0 * float(v) for v in found.residual_in_base[:, k]],
-            "distance_um": 1000.0 * float(np.linalg.norm(residual[:, k])),
+            "shift_um": [1000.0 * float(v) for v in _shift(found, k)],
+            "distance_um": 1000.0 * float(np.linalg.norm(lengths[:, k])),
             "times_expected": float(times[k]),
         }
         for k in order
     ]
+
+
+def _shift(found: Prediction, k: int) -> Array:
+    """Along the base's axes where a reading says where a point is, else component by component."""
+    rows = found.model.rows
+    if rows.placed[k]:
+        return np.asarray(found.residual_in_base[:, k])
+    return np.asarray(found.linear.residual[:, k] * rows.in_millimetres[:, k])
 
 
 def _bad(found: Prediction, one: Any) -> dict[str, Any]:

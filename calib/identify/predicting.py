@@ -10,7 +10,7 @@ frame's columns F is taken out of both,
 and that is what the new readings are judged by: what noise *and* the model's own uncertainty allow.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -74,7 +74,7 @@ class Prediction:
     @cached_property
     def covariance(self) -> Array:
         """What noise and model allow each residual (3, 3, N), mm2, tracker frame."""
-        unit = np.eye(3)[:, :, None]
+        unit = np.eye(3)[:, :, None] * self.model.rows.live[None]
         own = np.einsum("qin,qjn->ijn", self.spread, self.spread)
         taken = np.einsum("qin,qjn->ijn", self.frame, self.frame)
         factors = self.model.rows.unwhitener
@@ -104,7 +104,8 @@ class Prediction:
     @property
     def dof(self) -> int:
         """Components of accepted readings, less those of the refitted frames."""
-        return 3 * int(self.accepted.sum()) - int(self.frame.shape[0])
+        held = int(self.model.rows.components[self.accepted].sum())
+        return held - int(self.frame.shape[0])
 
     @property
     def log_p(self) -> float:
@@ -125,16 +126,17 @@ def predict(model: Model, known: Known, *, refit: bool) -> Prediction:
     accepted[[reading.row for reading in bad]] = False
     state = _state(model, known, begun.state if refit else None)
     linear = model.linearise(state)
-    frames = 6 * model.frames
+    own = len(model.names) - 6 * model.frames
+    refit = refit and model.frames > 0
     if refit:
         linear = _frames_fitted(model, linear, accepted)
     covariance = _by_rotation_vectors(model, linear.state, known.covariance)
     if refit:
-        covariance[-frames:, :] = covariance[:, -frames:] = 0.0
+        covariance[own:, :] = covariance[:, own:] = 0.0
     spread = np.tensordot(_root(covariance), linear.jacobian, axes=(0, 0))
     frame = np.zeros((0, *linear.whitened.shape))
     if refit:
-        frame = _orthonormal(linear.jacobian[-frames:], accepted)
+        frame = _orthonormal(linear.jacobian[own:], accepted)
         inner = np.tensordot(spread[:, :, accepted], frame[:, :, accepted], axes=([1, 2], [1, 2]))
         spread = spread - np.tensordot(inner, frame, axes=1)
     return Prediction(model, linear, accepted, tuple(bad), refit, spread, frame)
@@ -151,6 +153,8 @@ def shift_of_frames(found: Prediction) -> tuple[float, Array]:
         The shift of each frame, mm, and its rotation vector, rad.
     """
     frames = 6 * found.model.frames
+    if not frames:
+        return 0.0, np.zeros((6, 0))
     columns = found.linear.jacobian[-frames:, :, found.accepted].reshape(frames, -1)
     normal = Scaled.of(normal_matrix(columns, np.zeros(frames)))
     e = found.linear.whitened[:, found.accepted].reshape(-1)
@@ -168,15 +172,16 @@ def _state(model: Model, known: Known, begun: State | None) -> State:
     """The known values as a state; frames of ``begun`` where they are to be refitted."""
     count, frames = model.free.size, model.frames
     if begun is None:
-        placed = known.values[-6 * frames :].reshape(frames, 6).T
+        placed = known.values[known.values.size - 6 * frames :].reshape(frames, 6).T
         begun = model.start(from_euler(*placed[3:]), placed[:3])
     parameters = begun.parameters.copy()
     parameters[model.free] = known.values[:count]
     sizes = [len(group) for group in model.unknowns]
     ends = count + np.cumsum([0, *sizes])
     effects = tuple(known.values[a:b] for a, b in pairwise(ends))
-    return State(
-        parameters, effects, begun.frame_rotation, begun.frame_position, begun.configuration
+    setup = known.values[ends[-1] : ends[-1] + begun.setup.size]
+    return replace(
+        begun, parameters=parameters, effects=effects, setup=setup, near=begun.configuration
     )
 
 

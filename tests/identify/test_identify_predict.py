@@ -123,3 +123,35 @@ def test_what_cannot_be_predicted_is_refused(lab: Path, tmp_path: Path) -> None:
         pkmcal.predict(tmp_path / "two.toml", lab / "again")
     assert run(["predict", str(lab / "model.toml"), str(lab / "again"), "--out",
                 str(lab / "again" / "residuals.csv")]) == 2  # fmt: skip
+
+
+def test_readings_of_every_kind_are_predicted_and_their_frames_fitted(tmp_path: Path) -> None:
+    from app.files.residuals import residuals_text
+    from calib.identify import fit
+    from calib.identify.predicting import Known, predict
+    from calib.model.prediction import Model
+    from tests.kinds.conftest import everything, load, rows_of
+
+    machine = load("hexapod")
+    lab = everything(machine, seed=5)
+    rows = rows_of(machine, lab)
+    found = fit(Model(rows))
+    known = Known(found.values, found.covariance)
+    as_it_is = predict(Model(rows), known, refit=False)
+    assert np.allclose(as_it_is.linear.whitened, found.linear.whitened, atol=1e-6)
+    again = predict(Model(rows), known, refit=True)
+    assert again.dof == as_it_is.dof - 6 * again.model.frames
+    held = again.accepted
+    assert np.sum(again.linear.whitened[:, held] ** 2) <= 1.001 * np.sum(
+        as_it_is.linear.whitened[:, held] ** 2
+    )
+    text = residuals_text(again.model, again.linear, {})
+    kinds = {line["kind"] for line in csv.DictReader(text.splitlines())}
+    assert {"point", "angles", "distance"} <= kinds
+    for name, written in zip(("run.toml", "points.csv"), lab.texts(), strict=True):
+        (tmp_path / name).write_text(written)
+    pkmcal.fit(tmp_path).save(tmp_path.parent / "kinds.toml")
+    report = pkmcal.predict(tmp_path.parent / "kinds.toml", tmp_path)
+    assert report.ratio < 1.2
+    assert report.p_value > 0.5
+    assert faults_of(report.to_json()) == []
