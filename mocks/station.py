@@ -259,7 +259,9 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("--hidden", type=Path, help="hidden effects (TOML or JSON)")
     parser.add_argument("--nvm", type=Path, help="file of the controller's stored parameters")
     parser.add_argument("--serial", type=int, help="of the controller; else one for each --nvm")
-    parser.add_argument("--smrs", type=int, choices=[1, 3], default=1)
+    parser.add_argument(
+        "--smrs", type=int, choices=[1, 3], default=1, help="SMRs for the platform's nests"
+    )
     parser.add_argument("--no-base-smrs", action="store_true", help="base nests are empty")
     parser.add_argument(
         "--lines", action="store_true",
@@ -283,7 +285,9 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     parser.add_argument("--payload", type=float, default=0.0, help="kg")
     for name in ("controller", "tracker", "control"):
-        parser.add_argument(f"--{name}-port", type=int, default=0)
+        parser.add_argument(
+            f"--{name}-port", type=int, default=0, help="TCP port; a free one if left out"
+        )
     parser.add_argument("--site", type=Path, help="write a site file here")
     parser.add_argument("--until-stdin-closes", action="store_true", help="end with the parent")
     return parser

@@ -124,6 +124,8 @@ class LineServer:
     def _go(self, goal: list[float]) -> str:
         if not self.on:
             return "NO power"
+        if len(goal) != len(self.limits):
+            return "NO count"
         if any(not low <= q <= high for q, (low, high) in zip(goal, self.limits, strict=True)):
             return "NO limit"
         self.axes.go(goal)

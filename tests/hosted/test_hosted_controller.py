@@ -15,7 +15,14 @@ from app.hosted.means import ByMotors
 from app.hosted.parameters import ParameterSet
 from app.hosted.store import HostStore
 from calib.mechanism.solve import forward, inverse
-from drivers.contract import CONTROLLER_LAWS, ControllerBench, Law, why_not
+from drivers.contract import (
+    CONTROLLER_LAWS,
+    MOTORS_LAWS,
+    ControllerBench,
+    Law,
+    MotorsBench,
+    why_not,
+)
 from drivers.errors import ParameterError, Refused
 from drivers.interface import MotionController, Motors
 from drivers.kind import ActuatorFacts, Surroundings
@@ -48,6 +55,36 @@ async def connect(server: LineServer, folder: Path) -> HostedController:
         )
     )
     return HostedController(MACHINE, ByMotors(motors, MACHINE), store)
+
+
+@pytest.mark.parametrize("law", MOTORS_LAWS, ids=str)
+async def test_the_example_alone_holds_the_laws_of_motors(law: Law[MotorsBench]) -> None:
+    async with device() as server:
+
+        async def opened() -> Motors:
+            motors: Motors = await KIND.open(
+                Surroundings(
+                    {"address": f"127.0.0.1:{server.port}", "silence_s": 2.0}, "", "hexapod",
+                    FACTS, {},
+                )
+            )  # fmt: skip
+            return motors
+
+        async def silence() -> None:
+            server.silent = True
+
+        home = tuple(fact.home for fact in FACTS)
+        bench = MotorsBench(
+            open=opened,
+            longest_s=20.0,
+            actuators=FACTS,
+            places=(home, tuple(value + 12.0 + 3.0 * k for k, value in enumerate(home))),
+            unreachable=(*home[:-1], FACTS[-1].limits[1] + 1.0),
+            silence=silence,
+        )
+        if reason := await why_not(law, bench):
+            pytest.skip(reason)
+        await law.run(bench)
 
 
 @pytest.mark.parametrize("law", CONTROLLER_LAWS, ids=str)

@@ -190,3 +190,15 @@ def test_a_refusing_gate_ends_with_5(mock_of: Callable[..., Mock], tmp_path: Pat
 def test_numbers_that_json_cannot_say_become_null(capsys: pytest.CaptureFixture[str]) -> None:
     answer.print_json({"a": float("nan"), "b": [1.5, float("inf")], "c": "nan"})
     assert json.loads(capsys.readouterr().out) == {"a": None, "b": [1.5, None], "c": "nan"}
+
+
+def test_the_mock_tells_how_it_is_used_and_of_its_hands() -> None:
+    said = CliRunner().invoke(pkmcal, ["mock", "--help"])
+    assert said.exit_code == 0
+    assert said.stdout.startswith("Usage: pkmcal mock [OPTIONS] MACHINE\n")
+    assert "pkmcal mock do SITE COMMAND" in said.stdout
+    assert "--smrs [1|3]" in said.stdout
+    assert max(map(len, said.stdout.splitlines())) <= 100
+    nothing = CliRunner().invoke(pkmcal, ["mock"])
+    assert nothing.exit_code == 2
+    assert "Usage" in nothing.stderr
