@@ -279,7 +279,9 @@ def _of_physics(
         f"Add {best.name} ({says}): the error on held-out poses falls from "
         f"{1000 * found.holdout.rms_mm:.1f} to {1000 * outlook.holdout.rms_mm:.1f} um"
     )
-    rivals = [name for group in diagnosis.indistinguishable if best.name in group for name in group]
+    # A group of another effect is about a model that has this one already.
+    own = [group for group in diagnosis.indistinguishable if group[0] == best.name]
+    rivals = [name for group in own for name in group]
     others = [name for name in rivals if name != best.name]
     if others:
         text += (

@@ -102,7 +102,9 @@ def discover(
         if speaks_against(now.holdout, tried.holdout):
             refused.append(added)
             continue
-        groups += [group for group in now.diagnosis.indistinguishable if group not in groups]
+        # Groups of what was called for after it belong to other models.
+        own = [group for group in now.diagnosis.indistinguishable if group[0] == added]
+        groups += [group for group in own if group not in groups]
         steps.append(Revision(tried, added=added))
         refused = []
     steps += _superfluous(refit, steps, frozenset((*begin, *keep)))

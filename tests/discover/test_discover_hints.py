@@ -89,3 +89,15 @@ def test_likeness_is_the_cosine_between_what_is_there_and_the_nearest_effect() -
     assert "like backlash (0.8), but not backlash" in likeness_words(found, "it depends on q3")
     asked.unexplained = SimpleNamespace(significant=False)
     assert likeness_of(asked) is None  # type: ignore[arg-type]
+
+
+def test_what_is_like_an_effect_of_a_later_round_is_not_said_of_the_first() -> None:
+    class Grouped(Lab):
+        def __call__(self, names: tuple[str, ...]) -> Any:
+            stage = super().__call__(names)
+            if not names:
+                rival, other = ("backlash", "hysteresis"), ("contact", "lead-variation")
+                stage.diagnosis.indistinguishable = (rival, (*other, "backlash"))
+            return stage
+
+    assert discover(Grouped(5e-3)).indistinguishable == (("backlash", "hysteresis"),)
