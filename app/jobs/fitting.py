@@ -15,6 +15,7 @@ from app.jobs.record import Record, Report
 from app.jobs.remembering import remember_fit
 from calib.discover.agreement import runs_at_odds, successive_alike
 from calib.identify import Fit, fit_report
+from calib.identify.beyond import beyond_words
 from calib.identify.staged import fit_effects
 from calib.look.judged import record_of
 from calib.runs.remark import plain_remarks
@@ -190,7 +191,9 @@ def fit(
         **fit_report(found),
         "settled": found.settled,
         "steps": found.steps,
-        "remarks": [f"{one}." for one in (odds, successive_alike(found)) if one],
+        "remarks": [
+            f"{one}." for one in (odds, successive_alike(found), *beyond_words(found)) if one
+        ],
         "record": plain_remarks(record_of(found)),
     }
     return FitReport.of(said, _fit=found, _runs=names)
