@@ -24,6 +24,7 @@ from app.jobs.fitting import RemarkEntry
 from app.jobs.record import Report
 from calib.errors import BadInput
 from calib.identify.staged import fit_effects
+from calib.identify.starting import NOWHERE
 from calib.look import first_look
 from calib.look.conventions import Misread
 from calib.look.judged import record_of
@@ -285,7 +286,13 @@ def _looked(
             raise BadInput(wrong.what, place=wrong.place, remedy=where) from wrong
         return [_remark("misread", wrong.what, where, runs[0].source)]
     except BadInput as wrong:
-        return [_remark("no-fit", str(wrong), "No analysis can use the run before", runs[0].source)]
+        remedy = (
+            "No analysis can use the run before. Other units, signs, orders of axes and a mirrored "
+            "frame fit no better: rows of another machine, or another nest table, look like this"
+            if NOWHERE in wrong.what
+            else "No analysis can use the run before"
+        )
+        return [_remark("no-fit", str(wrong), remedy, runs[0].source)]
 
 
 def _remark(name: str, says: str, remedy: str, source: str) -> Remark:

@@ -15,6 +15,8 @@ from calib.model.state import Linearised, State
 MAJORITY = 0.3
 """Least part of a run's readings that must stand where the machine's nests can be."""
 
+NOWHERE = "are where a nest can be"
+"""Said of a run of which too few readings stand where they can."""
 AT_REST = 0.1
 """How far the nests on the base may wander during a run and count as at rest, mm."""
 MOVED = ", moved as one with others: the tracker or the base was moved during the run"
@@ -92,7 +94,7 @@ def _aligned_robustly(
         R, t, inside = robust_align(base[:, here], rows.position[:, here], slack[here])
         if inside.sum() < max(6, MAJORITY * here.size) and inside.sum() < here.size:
             raise BadInput(
-                f"only {inside.sum()} of {here.size} readings are where a nest can be"
+                f"only {inside.sum()} of {here.size} readings {NOWHERE}"
                 + _seen_from_base(model, base, here, slack),
                 place=rows.runs[rows.frames[run].run].source,
                 remedy="Check the machine, the units (mm), the nests in run.toml, and whether the "

@@ -73,6 +73,19 @@ def test_an_import_is_refused_where_the_data_prove_the_map_wrong(bench, tmp_path
     assert read_run(tmp_path / "run").run.readings == bench.run.readings
 
 
+@pytest.mark.long
+def test_rows_of_another_machine_are_said_to_be_that(bench, tmp_path) -> None:
+    """Readings that no way of writing brings to their nests."""
+    draws = np.random.default_rng(3).normal(0.0, 300.0, bench.run.position.shape)
+    few = bench.run.measured & (np.cumsum(bench.run.measured) % 3 == 0)
+    run = replace(bench.run, position=bench.run.position + draws, measured=few)
+    table, plan = bench.table(tmp_path / "a.csv", run), bench.plan(tmp_path / "map.toml")
+    report = import_run(table, plan, tmp_path / "run", header=bench.header)
+    (said,) = (one for one in report.record if one.name == "no-fit")
+    assert "rows of another machine" in said.remedy
+    assert not said.settled
+
+
 def test_what_the_first_look_knows_is_said_with_the_lines_of_the_file(bench, tmp_path) -> None:
     run = bench.run
     nest = list(run.nest)
