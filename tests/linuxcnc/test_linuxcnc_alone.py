@@ -3,6 +3,7 @@
 import asyncio
 from pathlib import Path
 
+import numpy as np
 import pytest
 from linuxcnc_bench import FOLLOWED_S, NOMINAL, Bench, keep_moving, ready, running, some_poses
 
@@ -86,5 +87,31 @@ async def test_without_genhexkins_it_is_refused(tmp_path: Path) -> None:
         with pytest.raises(Refused, match="pin of genhexkins is missing"):
             async with bench.driver(hal=str(tmp_path / "geometry.hal")):
                 pass
+    finally:
+        bench.station.stop()
+
+
+async def test_a_table_of_a_screw_is_followed_but_only_from_its_start(tmp_path: Path) -> None:
+    """What COMP_FILE does, for which there is no pin: a trial in volatile memory is impossible."""
+    bench = Bench(tmp_path)
+    nominal = np.linspace(200.0, 280.0, 250)
+    trim = 0.012 * np.sin(2.0 * np.pi * nominal / 4.0)
+    table = "".join(f"{x:.6f} {t:.6f} {t:.6f}\n" for x, t in zip(nominal, trim, strict=True))
+    (tmp_path / "screw.comp").write_text(table)
+    ini = bench.station.program.ini
+    entries = "[JOINT_0]\nCOMP_FILE = screw.comp\nCOMP_FILE_TYPE = 1\n"
+    ini.write_text(ini.read_text().replace("[JOINT_0]\n", entries))
+    pins = ["joint.0.motor-pos-cmd", "joint.0.pos-cmd", "joint.0.motor-offset"]
+    bench.station.start()
+    try:
+        async with bench.driver() as controller:
+            await ready(controller)
+            for pose in some_poses(6, seed=4):
+                await controller.move_to_pose(pose)
+                await controller.wait_arrived(20.0)
+                values = (await controller._ask("get", pins=pins))["values"]
+                motor, joint, offset = (values[pin] for pin in pins)
+                told = np.interp(joint, nominal, trim)
+                assert motor - joint - offset == pytest.approx(told, abs=1e-4)
     finally:
         bench.station.stop()
