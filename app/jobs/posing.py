@@ -20,12 +20,16 @@ from calib.mechanism.limits import Margin
 from calib.poses.design import CANDIDATES, TABLE, Design, design_poses
 from calib.poses.information import Accuracy
 from calib.poses.margin import tolerance_margin
-from calib.poses.readings import HAN_2020, NestReadings, PoseNoise, Readings
+from calib.poses.readings import HAN_2020, DirectionReadings, NestReadings, PoseNoise, Readings
 from calib.poses.verification import VerificationGrid, verification_poses
 
 ANGLES = ("rx", "ry", "rz", "tilt", "azimuth")
 SITE_SIGMA_UM = 5.0
 """Standard uncertainty per axis that is expected of a reading of a nest."""
+
+
+PROBE_SIGMA_UM = 10.0
+"""The same of a height, by a touch probe."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,6 +146,7 @@ def choose_poses(
     site: File | None = None,
     criterion: Literal["I", "D"] = "I",
     priors: bool = True,
+    heights: bool = False,
     sigma_um: float | None = None,
     angle_mdeg: float | None = None,
     candidates: int = CANDIDATES,
@@ -163,6 +168,8 @@ def choose_poses(
         Smallest predicted pose error, or most information about the parameters.
     priors : bool
         Use the machine file's tolerances as priors.
+    heights : bool
+        Only heights over the base are read: of the site's nests, or of the platform's origin.
     sigma_um, angle_mdeg : float, optional
         Standard uncertainty of a reading per axis, um, and of an angle, mdeg, where whole poses
         are read.
@@ -196,7 +203,7 @@ def choose_poses(
     margin = _margin(described, path, margin_mm)
     found = design_poses(
         described,
-        _readings(described, path, sigma_um, angle_mdeg),
+        _readings(described, path, heights, sigma_um, angle_mdeg),
         n,
         np.random.default_rng(seed),
         criterion=criterion,
@@ -212,6 +219,7 @@ def choose_poses(
     )
     command += "" if priors else " --no-priors"
     command += f" --site {site}" if site else ""
+    command += " --heights" if heights else ""
     command += f" --sigma-um {sigma_um:g}" if sigma_um is not None else ""
     command += f" --angle-mdeg {angle_mdeg:g}" if angle_mdeg is not None else ""
     command += f" --margin-mm {margin_mm:g}" if margin_mm is not None else ""
@@ -269,12 +277,22 @@ def _machine(name: str, site: Path | None) -> Machine:
 
 
 def _readings(
-    machine: Machine, site_file: Path | None, sigma_um: float | None, angle_mdeg: float | None
+    machine: Machine,
+    site_file: Path | None,
+    heights: bool,
+    sigma_um: float | None,
+    angle_mdeg: float | None,
 ) -> Readings:
     """Nests of the site, or whole poses with the noise of Han et al. 2020 if nothing is said."""
     for value, what in ((sigma_um, "--sigma-um"), (angle_mdeg, "--angle-mdeg")):
         if value is not None and value <= 0.0:
             raise BadInput(f"{what} is {value:g}", remedy="Give a positive uncertainty.")
+    if heights:
+        if angle_mdeg is not None:
+            raise BadInput("heights have no angle", remedy="Leave --angle-mdeg out.")
+        nests = nest_matrix(load_site(site_file).platform_nests) if site_file else np.zeros((3, 1))
+        sigma = (PROBE_SIGMA_UM if sigma_um is None else sigma_um) * 1e-3
+        return DirectionReadings(nests, np.array([[0.0], [0.0], [1.0]]), sigma)
     if site_file:
         site = load_site(site_file)
         sigma = (SITE_SIGMA_UM if sigma_um is None else sigma_um) * 1e-3

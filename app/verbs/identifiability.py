@@ -20,7 +20,7 @@ from calib.analysis.subsets import compare_subsets, matching
 from calib.arrays import Array
 from calib.mechanism.description import Machine
 from calib.poses.reach import PoseSet, sample_poses
-from calib.poses.readings import HAN_2020, PoseNoise
+from calib.poses.readings import HAN_2020, DirectionReadings, PoseNoise
 
 POSES, FRESH = 60, 300
 NEST_RADIUS = 100.0
@@ -31,10 +31,11 @@ NEST_RADIUS = 100.0
 @machine_options
 @click.option(
     "--read",
-    type=click.Choice(["nests", "poses", "positions"]),
+    type=click.Choice(["nests", "poses", "positions", "heights"]),
     default="nests",
     show_default=True,
-    help="What is read at each pose: SMR nests, the whole pose, or the platform's origin.",
+    help="What is read at each pose: SMR nests, the whole pose, the platform's origin, or the "
+    "nests' heights over the base.",
 )
 @click.option(
     "--nests",
@@ -142,6 +143,9 @@ def _sights(
     base = base[:, :0] if no_base_nests else base
     if read == "nests":
         return Sights(platform, sigma * 1e-3, base, frame_free=frame_free, nests_free=nests_free)
+    if read == "heights":
+        heights = DirectionReadings(platform, np.array([[0.0], [0.0], [1.0]]), sigma * 1e-3)
+        return Sights(np.zeros((3, 0)), sigma * 1e-3, pose_noise=heights)
     whole = HAN_2020 if sigma_um is None else PoseNoise(sigma * 1e-3, HAN_2020.angle_sigma)
     noise = whole if read == "poses" else PoseNoise(whole.position_sigma, None)
     none = np.zeros((3, 0))

@@ -34,6 +34,7 @@ from calib.poses.design import CANDIDATES
     "--priors/--no-priors", default=True, show_default=True, help="Use the tolerances as priors."
 )
 @click.option("--site", "site_file", type=click.Path(path_type=Path), help="Nests of a site file.")
+@click.option("--heights", is_flag=True, help="Only heights over the base are read.")
 @click.option("--sigma-um", type=float, help="Standard uncertainty of a reading per axis, um.")
 @click.option("--angle-mdeg", type=float, help="The same of an angle, where poses are read whole.")
 @click.option(
@@ -61,6 +62,7 @@ def command(
     criterion: str,
     priors: bool,
     site_file: Path | None,
+    heights: bool,
     sigma_um: float | None,
     angle_mdeg: float | None,
     candidates: int,
@@ -90,6 +92,7 @@ def command(
             site=site_file,
             criterion="D" if criterion == "D" else "I",
             priors=priors,
+            heights=heights,
             sigma_um=sigma_um,
             angle_mdeg=angle_mdeg,
             candidates=candidates,

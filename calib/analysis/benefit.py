@@ -70,8 +70,9 @@ def _changes(
     if count:
         extra = _another_nest(sights)
         yield f"{count + 1} platform nests", replace(sights, nests=extra), poses
-    if sights.pose_noise is not None and sights.pose_noise.angle_sigma is not None:
-        blind = PoseNoise(sights.pose_noise.position_sigma, None)
+    whole = sights.pose_noise
+    if isinstance(whole, PoseNoise) and whole.angle_sigma is not None:
+        blind = PoseNoise(whole.position_sigma, None)
         yield "positions only", replace(sights, pose_noise=blind), poses
     if sights.frame_free and sights.base.shape[1]:
         yield "no base nests", replace(sights, base=np.zeros((3, 0))), poses

@@ -36,8 +36,8 @@ class Sights:
         SMR centres on the base, base frame, mm, each read ``base_reads`` times.
     frame_free, nests_free : bool
         Whether the base frame, and the nests, have to be found as well.
-    pose_noise : PoseNoise, optional
-        Noise of poses that are read whole.
+    pose_noise : Readings, optional
+        What is read of poses otherwise: whole, or heights, in a known frame.
     """
 
     nests: Array
@@ -46,7 +46,7 @@ class Sights:
     base_reads: int = 2
     frame_free: bool = False
     nests_free: bool = False
-    pose_noise: PoseNoise | None = None
+    pose_noise: Readings | None = None
 
     def __post_init__(self) -> None:
         if (self.pose_noise is None) != (self.nests.shape[1] > 0):

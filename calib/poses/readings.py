@@ -131,6 +131,58 @@ class NestReadings:
         return self.base_reads * information / self.sigma**2
 
 
+@dataclass(frozen=True, eq=False)
+class DirectionReadings:
+    """Components of nests on the platform along known directions: heights, dial gauges.
+
+    Attributes
+    ----------
+    nests : (3, M)
+        Platform frame, mm.
+    axes : (3, K)
+        Unit directions, base frame; every nest is read along each.
+    sigma : float
+        Standard uncertainty of a component, mm.
+    """
+
+    nests: Array
+    axes: Array
+    sigma: float
+
+    def __post_init__(self) -> None:
+        if self.sigma <= 0.0:
+            raise BadInput("the uncertainty of a reading is not positive")
+
+    @property
+    def says(self) -> str:
+        """What is read, in words."""
+        nests, axes = self.nests.shape[1], self.axes.shape[1]
+        heights = axes == 1 and np.allclose(self.axes[:, 0], (0.0, 0.0, 1.0))
+        what = "heights" if heights else f"components along {axes} directions"
+        of = "the platform's origin" if not np.any(self.nests) else f"{nests} platform nests"
+        return f"{what} of {of}, +-{self.sigma * 1e3:.3g} um (1 sigma)"
+
+    @property
+    def frame_free(self) -> bool:
+        """The directions are known in the base frame."""
+        return False
+
+    def root(self, poses: Poses) -> Array:
+        """Root (6, 6, N) of the sum over nests and axes a of r^T r / sigma^2, r = [a, R m x a]."""
+        rows = []
+        for nest in self.nests.T:
+            arm = rotate(poses.rotation, nest[:, None])
+            for axis in self.axes.T:
+                along = np.repeat(axis[:, None], poses.count, axis=1)
+                rows.append(np.concatenate([along, cross(arm, along)]))
+        stacked = np.array(rows) / self.sigma
+        return _root(np.einsum("rin,rjn->nij", stacked, stacked))
+
+    def frame_information(self) -> Array:
+        """Nothing is asked about the frame."""
+        return np.zeros((6, 6))
+
+
 def _point_information(arm: Array) -> Array:
     """[I, -[a]x]^T [I, -[a]x], shape (6, 6, N), for points at ``arm`` (3, N) from the origin."""
     rows = np.zeros((3, 6, arm.shape[1]))
