@@ -11,12 +11,13 @@ from typing import Any
 
 import click
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TaskID, TextColumn
 
 from app.answer import interactive
 from app.session import events as ev
 from app.session.kinds import KINDS
 from app.session.session import Outcome, Session
+from app.show.spans import duration
 
 STOPS = ("SIGINT", "SIGTERM", "SIGHUP")
 
@@ -30,15 +31,16 @@ class ConsoleFace:
         """Whether the step in work is of a kind that is too frequent to tell each end."""
         self._console = Console(stderr=True, quiet=quiet, highlight=False, soft_wrap=True)
         self._progress = Progress(
-            TextColumn("{task.completed:.0f}/{task.total:.0f}"),
+            TextColumn("{task.completed:.0f} of {task.total:.0f}"),
             BarColumn(bar_width=24),
-            TimeRemainingColumn(),
-            TextColumn("{task.description}"),
+            TextColumn("{task.fields[left]}"),
+            TextColumn("{task.description}", markup=False),
             console=self._console,
             transient=True,
             disable=quiet or not self._console.is_terminal,
         )
-        self._task: TaskID = self._progress.add_task("", total=total)
+        self._task: TaskID = self._progress.add_task("", total=total, left="")
+        self._total = total
         self._asking: set[asyncio.Task[None]] = set()
 
     @contextmanager
@@ -53,8 +55,10 @@ class ConsoleFace:
             case ev.StepStarted(says=says, kind=kind):
                 self._often = KINDS[kind].often
                 self._progress.update(self._task, description=says)
-            case ev.Progress(done=done, total=total):
-                self._progress.update(self._task, completed=done, total=total)
+            case ev.Progress(done=done, total=total, remaining_s=remaining):
+                left = "" if remaining is None else f"{duration(remaining)} left"
+                self._progress.update(self._task, completed=done, total=total, left=left)
+                self._total = total
             case ev.PromptNeeded():
                 asking = asyncio.create_task(self._ask(event))
                 self._asking.add(asking)
@@ -62,7 +66,7 @@ class ConsoleFace:
             case ev.StepDone() if self._often:
                 pass
             case _:
-                words = _words(event)
+                words = _words(event, self._total)
                 if words:
                     self._console.print(words, markup=False)
 
@@ -106,7 +110,7 @@ async def in_daemon_thread(ask: Callable[[], str]) -> str:
     return await given
 
 
-def _words(event: ev.Event) -> str:
+def _words(event: ev.Event, total: int) -> str:
     """One line for what an operator wants to read; empty for the rest."""
     match event:
         case ev.Connected(role=role, identity=who, address=address):
@@ -119,14 +123,14 @@ def _words(event: ev.Event) -> str:
             return f"going on: {why}"
         case ev.ReadingRejected(pose_label=pose, nest=nest, why=why):
             return f"reading of nest {nest} at pose {pose or 'home'} set aside: {why}"
-        case ev.StepDone(summary=summary, step=step):
-            return f"  {step}: {summary}"
+        case ev.StepDone(summary=summary, index=index):
+            return f"  {index + 1} of {total}: {summary}"
         case ev.GateChecked(passed=passed, says=says):
             return f"  {'passed ' if passed else 'REFUSED'} {says}"
         case ev.WriteBackStage(stage=stage, says=says):
             return f"  {stage}: {says}"
-        case ev.StepSkipped(step=step, why=why):
-            return f"  {step}: skipped, {why}"
+        case ev.StepSkipped(index=index, why=why):
+            return f"  {index + 1} of {total}: skipped, {why}"
     return ""
 
 

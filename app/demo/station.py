@@ -37,7 +37,15 @@ def mock_station(
     deadline_s = TURN_DEADLINE_S if "--linuxcnc" in arguments else START_DEADLINE_S
     with complaints.open("w", encoding="utf-8") as log:
         station = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=log,
+            text=True,
+            # Ctrl-C is for this program, which then lets the station end: a station that dies of
+            # it as well would look like a fault of the hardware.
+            start_new_session=True,
+            creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
         )
         try:
             _first_answer(station, complaints, deadline_s)

@@ -5,8 +5,8 @@ import pytest
 from textual.app import App, ComposeResult
 from textual_hires_canvas.canvas import Canvas
 
+from app.show.spans import duration
 from app.tui.theme import SERIES
-from app.tui.widgets.frame import duration
 from app.tui.widgets.plots import PairPlot, few_ticks, thin
 
 

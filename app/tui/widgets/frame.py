@@ -7,6 +7,7 @@ from textual.reactive import reactive
 from textual.widget import Widget
 from textual.widgets import Static
 
+from app.show.spans import duration
 from app.tui.picture import Picture
 
 STOP_KEY = "ctrl+x"
@@ -55,14 +56,6 @@ def state_text(picture: Picture, connected: bool) -> str:
         if progress.remaining_s is not None:
             text += f" · {duration(progress.remaining_s)} left"
     return text if connected or picture.busy else f"{text} · not connected"
-
-
-def duration(seconds: float) -> str:
-    """Render a time span: ``45 s``, ``12 min``, ``2 h 05``."""
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    minutes = round(seconds / 60)
-    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60:02d}"
 
 
 class TabLine(Widget):
