@@ -5,7 +5,8 @@
     pose,x,y,z,rx,ry,rz,payload_kg,time_s
     1,10.0,-5.0,221.5,0.05,-0.1,0.2,5.0,30
 
-The machine's task coordinates or all six, mm and rad; any other column of numbers is a channel.
+The machine's task coordinates or all six, mm and rad, or in the unit that stands in the head
+(``rx [deg]``) or behind a number (``5 deg``); any other column of numbers is a channel.
 Lines that start with # are remarks. The format is described in docs/correct.md.
 """
 
@@ -19,11 +20,13 @@ import numpy as np
 
 from app.files.poses import read_pose_file
 from app.files.text import read_text
+from app.files.unit_columns import Column, column
 from calib.arrays import Array
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import Poses
 from calib.mechanism.task import FULL, task_values
+from calib.quantity import is_quantity
 
 NAME, TIME = "pose", "time_s"
 
@@ -56,14 +59,16 @@ def read_wanted(path: Path, machine: Machine) -> Wanted:
         raise BadInput(
             "there is no pose", place=str(path), remedy=f"Write a header {_header(own)} and rows"
         )
-    names = [cell.strip() for cell in next(csv.reader([lines[0][1]]))]
     place = f"{path}, line {lines[0][0]}"
+    measures = {name: "mm" if name in "xyz" else "rad" for name in (*own, *FULL)}
+    heads = [column(cell, measures, place) for cell in next(csv.reader([lines[0][1]]))]
+    names = [head.name for head in heads]
     _check_header(names, own, place)
     labels: list[str] = []
     rows: list[dict[str, float]] = []
     for number, line in lines[1:]:
         cells = next(csv.reader([line]))
-        label, values = _row(cells, names, f"{path}, line {number}")
+        label, values = _row(cells, heads, f"{path}, line {number}")
         labels.append(label or str(len(labels) + 1))
         rows.append(values)
     columns = {name: np.array([row[name] for row in rows]) for name in names if name != NAME}
@@ -97,15 +102,19 @@ def _check_header(names: list[str], own: tuple[str, ...], place: str) -> None:
         )
 
 
-def _row(cells: list[str], names: list[str], place: str) -> tuple[str, dict[str, float]]:
-    if len(cells) != len(names):
+def _row(cells: list[str], heads: list[Column], place: str) -> tuple[str, dict[str, float]]:
+    if len(cells) != len(heads):
         raise BadInput(
-            f"{len(cells)} cells under {len(names)} columns", place=place, remedy="Complete it"
+            f"{len(cells)} cells under {len(heads)} columns", place=place, remedy="Complete it"
         )
     label, values = "", {}
-    for name, cell in zip(names, cells, strict=True):
+    for head, cell in zip(heads, cells, strict=True):
+        name = head.name
         if name == NAME:
             label = cell.strip()
+            continue
+        if head.measures and is_quantity(cell.strip()):
+            values[name] = head.number(cell.strip(), place)
             continue
         try:
             values[name] = float(cell)

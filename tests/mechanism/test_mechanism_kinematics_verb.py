@@ -96,3 +96,19 @@ def test_heads_name_their_unit_in_three_ways() -> None:
         assert found.number("180", "here") == pytest.approx(np.pi)
         assert found.number("1 rad", "here") == pytest.approx(1.0)
     assert column("time_s", {"rx": "rad"}, "here").measures == ""
+
+
+def test_tables_of_wanted_poses_may_be_in_degrees(tmp_path: Path) -> None:
+    from app.files.machines import load_machine
+    from app.files.wanted_poses import read_wanted
+
+    machine = load_machine("hexapod")
+    plain, degrees = tmp_path / "rad.csv", tmp_path / "deg.csv"
+    plain.write_text(f"x,y,z,rx,ry,rz,payload_kg\n1,2,230,{np.deg2rad(5)},0,{np.deg2rad(-3)},4\n")
+    degrees.write_text("x [cm],y,z,rx [deg],ry,rz,payload_kg\n0.1,2,230,5,0,-3 deg,4\n")
+    with pytest.raises(BadInput, match="unit"):
+        read_wanted(degrees, machine)
+    degrees.write_text("x [m],y,z,rx [deg],ry,rz,payload_kg\n0.001,2,230,5,0,-3 deg,4\n")
+    one, other = read_wanted(plain, machine), read_wanted(degrees, machine)
+    assert np.allclose(one.task, other.task, atol=1e-12)
+    assert other.channels["payload_kg"] == [4.0]
