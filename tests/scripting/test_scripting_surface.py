@@ -64,8 +64,9 @@ FIELDS = {
     "DiscoveryReport": "steps effects adequate record indistinguishable unexplained likeness hints "
     "noise bad_readings unavailable parameters refused advice",
     "FitReport": "effects readings chi2_per_dof rms_um noise_floor_um holdout_rms_um "
-    "holdout_floor_um parameters unidentified unidentified_words bad_readings left_out_readings "
-    "channels_left_aside settled steps remarks record",
+    "holdout_floor_um platform_rms_um platform_floor_um by_kind parameters unidentified "
+    "unidentified_words bad_readings left_out_readings channels_left_aside settled steps remarks "
+    "record",
     "FollowUpReport": "machine discriminate model runs conditions right_now right_then poses "
     "advice",
     "GridReport": "machine workspace_scale box poses",
