@@ -13,8 +13,8 @@ import pytest
 import pkmcal
 
 SIGNATURES = {
-    "choose_poses": "machine=None, n=29, *, site=None, criterion='I', priors=True, sigma_um=None, "
-    "angle_mdeg=None, candidates=2500, seed=1, margin_mm=None",
+    "choose_poses": "machine=None, n=29, *, site=None, criterion='I', priors=True, "
+    "heights=False, sigma_um=None, angle_mdeg=None, candidates=2500, seed=1, margin_mm=None",
     "compare": "runs, *, add=(), model=None, propose=None, watch=None",
     "complete": "machine, *, tool=False",
     "correct": "model, poses, *, machine=None, payload=None, temperature=None, channels=None, "
