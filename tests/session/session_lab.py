@@ -178,7 +178,8 @@ class Lab:
 
 
 @cache
-def _site() -> Site:
+def lab_site() -> Site:
+    """The site file of a lab that does not exist."""
     return parse_site(site_text(smrs=3), "site.toml", Path())
 
 
@@ -186,7 +187,7 @@ def lab_in(
     folder: Path, *, plan: Plan | None = None, hands: dict | None = None, limits: dict | None = None
 ) -> Lab:
     """A session that is connected to a room in which every nest holds an SMR."""
-    site = _site()
+    site = lab_site()
     site = replace(
         site,
         clock_scale=SCALE,

@@ -61,6 +61,7 @@ def test_what_is_exported_is_read_back() -> None:
     exported = run_of(rows, HEADER, 6)
     again = parse_run(*format_run(exported, DIGITS), actuators=6)
     assert again.pose == ("a", "b") == exported.pose
+    np.testing.assert_array_equal(again.line, exported.line)  # a fault names the same line
     np.testing.assert_allclose(again.covariance, exported.covariance, rtol=1e-6)
     np.testing.assert_array_equal(again.channels["delay_s"], [np.nan, 2.0])
 

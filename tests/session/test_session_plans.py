@@ -41,6 +41,29 @@ def test_every_pose_is_read_in_every_nest_once_a_cycle(site: Site, order: Order)
     assert len(groups) > 3
 
 
+@pytest.mark.parametrize("order", ["nest-by-nest", "pose-by-pose"])
+@pytest.mark.parametrize("every", [1, 4, 5])
+def test_the_base_is_looked_at_after_so_many_poses(site: Site, order: Order, every: int) -> None:
+    plan = measure_plan(site, POSES, PlanOptions(order=order, reference_every=every))
+    moves, between = 0, []
+    for step in plan.steps:
+        moves += step.kind is kinds.MOVE
+        if step.kind is kinds.DRIFT:
+            between.append(moves)
+            moves = 0
+    total = len(POSES) * (1 if order == "pose-by-pose" else 3)
+    whole, rest = divmod(total - 1, every)
+    assert between == [0, *[every] * whole, rest + 1]
+
+
+@pytest.mark.parametrize("order", ["nest-by-nest", "pose-by-pose"])
+def test_every_smr_is_carried_that_there_is_and_no_other(site: Site, order: Order) -> None:
+    plan = measure_plan(site, POSES, PlanOptions(order=order))
+    carried = [(s.args["smr"], s.args["nest"]) for s in plan.steps if s.kind is kinds.CARRY]
+    one = order == "nest-by-nest"
+    assert carried == [(1 if one else k, nest) for k, nest in enumerate("345", start=1)]
+
+
 def test_nothing_moves_before_the_path_is_checked(site: Site) -> None:
     order = [step.kind.name for step in measure_plan(site, POSES, PlanOptions()).steps]
     moving = [order.index(kind) for kind in ("home", "move", "drives")]

@@ -27,13 +27,15 @@ class StreamingTracker:
     def __init__(self, x: Callable[[float], float]) -> None:
         self._x = x
         self.last_s = 0.0
+        self.given: list[tuple[float, float, float]] = []
 
     async def stream(self, separation_s: float) -> AsyncIterator[TrackSample]:
         noise = np.random.default_rng(7)
         for k in range(10_000):
             self.last_s = k * separation_s
             x, y, z = NOISE_MM * noise.standard_normal(3)
-            yield TrackSample(self.last_s, (x + self._x(self.last_s), y, z), True)
+            self.given.append((x + self._x(self.last_s), y, z))
+            yield TrackSample(self.last_s, self.given[-1], True)
 
 
 @pytest.fixture
@@ -58,6 +60,16 @@ async def test_a_machine_that_stands_is_accepted_after_one_window(work: Work) ->
     await settle(seen_by(work, tracker))
     assert work.memory.settled
     assert tracker.last_s == pytest.approx(work.limits.settle_window_s, abs=0.06)
+
+
+async def test_what_is_told_is_the_scatter_in_space_of_the_samples(
+    work: Work, heard: Heard
+) -> None:
+    tracker = StreamingTracker(lambda t: 0.0)
+    await settle(seen_by(work, tracker))
+    given = np.array(tracker.given)
+    variances = np.sum((given - given.mean(axis=0)) ** 2, axis=0) / (len(given) - 1)
+    assert heard.of(ev.LiveScatter)[0].std_mm == pytest.approx(np.sqrt(variances.sum()))
 
 
 async def test_a_machine_that_creeps_slowly_and_for_ever_is_never_accepted(

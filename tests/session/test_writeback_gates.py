@@ -4,14 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from session_lab import lab_site
 
 from app.errors import GateRefused
 from app.files.fits import SavedFit
 from app.files.machines import load_machine
+from app.session.path import check_waypoints
+from app.session.station import Station
 from app.writeback.gates import Gates, gates_of_check, gates_of_proposal, refuse_if_any
+from app.writeback.procedure import check_poses
 from app.writeback.proposal import Change, propose
 from calib.errors import BadInput
 from calib.pose_error import Summary
+from calib.poses import verification_poses
 from calib.unknown import Estimate, Unknown
 
 MACHINE = load_machine("hexapod")
@@ -89,6 +94,25 @@ def test_a_change_is_told_in_standard_uncertainties() -> None:
 def test_parameters_that_leave_the_workspace_are_refused() -> None:
     far = {f"leg{i}__B_z": -8.0 for i in range(1, 7)}
     assert "workspace" in failed(made(**far), Gates.with_limits({"tolerance": 1e3}))
+
+
+def test_a_single_pose_that_is_lost_is_one_too_many() -> None:
+    assert GATES.check("workspace", 0.0, "", "outside").passed
+    assert not GATES.check("workspace", 1.0, "", "outside").passed
+
+
+@pytest.mark.parametrize("machine", ["hexapod", "delta"])
+def test_check_poses_are_eight_of_the_grid_and_spread_over_its_places(machine: str) -> None:
+    known = load_machine(machine)
+    chosen = check_poses(Station(replace(lab_site(), machine=known)))
+    grid = verification_poses(known).by_label
+    assert chosen.items() <= grid.items()
+    assert len(chosen) == 8
+    places = [np.array(list(poses.values()))[:, :3] for poses in (chosen, grid)]
+    assert np.all(np.ptp(places[0], axis=0) >= 0.99 * np.ptp(places[1], axis=0))
+    assert len(np.unique(places[0].round(6), axis=0)) == 8
+    path = [known.home, *chosen.values(), known.home]
+    assert check_waypoints(known, {}, path, ["home", *chosen, "home"]) > 0.0
 
 
 @pytest.mark.parametrize(("scale", "worse"), [(0.8, 1.255), (1.1, 0.908)])
