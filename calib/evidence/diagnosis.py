@@ -27,12 +27,15 @@ from calib.evidence.rounds import (
     signature_of,
 )
 from calib.evidence.scores import Scores, score
+from calib.evidence.tails import log_tail
 from calib.unknown import estimates_of
 
 DRAWS = 399
 FIRST_DRAWS = 99
 IN_QUESTION = 7.0
 """Candidates whose evidence is less than e^7 below the best are still in question."""
+CLEAR, SAME = 1e-3, 1e-6
+"""p-value below which an addition is no chance; part of a signature that is rounding."""
 UNKNOWN_MARGIN = 10.0
 """Structure of unknown origin must beat the effects' evidence by e^10 to be preferred,"""
 UNKNOWN_SHARE = 0.1
@@ -124,9 +127,30 @@ def _groups(found: Exploration, alpha: float) -> list[tuple[int, ...]]:
         signatures = {index: at_least(judged.scores, index) for index in questioned}
         others = rivals(judged.scores, best, questioned, signatures)
         others += [one for one in _as_good(judged, best, alpha) if one not in others]
+        others = [one for one in others if not _only_wider(judged.scores, best, one)]
         if others:
             groups.append((best, *others))
     return groups
+
+
+def _only_wider(scores: Scores, best: int, rival: int) -> bool:
+    """Whether a rival holds the best as a special case, and what it adds may be chance.
+
+    One expansion of all legs is the case of six that are equal: six are no rival of it as long as
+    these readings do not ask for six, however little their evidence differs.
+    """
+    _, trial = best_hypothesis(scores, best)
+    number, other = best_hypothesis(scores, rival)
+    part, whole = scores.candidates[best].columns[trial], scores.candidates[rival].columns[other]
+    if len(whole) <= len(part):
+        return False
+    left = part - np.linalg.lstsq(whole.T, part.T, rcond=None)[0].T @ whole
+    if np.linalg.norm(left) > SAME * np.linalg.norm(part):
+        return False
+    mine, dof = scores.fall(best, *best_hypothesis(scores, best))
+    theirs, of_whole = scores.fall(rival, number, other)
+    more = np.array(max(theirs - mine, 0.0) / scores.noise**2)
+    return bool(log_tail(more, float(of_whole - dof)) > np.log(CLEAR)) if of_whole > dof else True
 
 
 def _as_good(judged: Round, best: int, alpha: float) -> list[int]:

@@ -55,6 +55,35 @@ def test_discover_pairs_that_the_readings_left_undecided_are_named_whatever_was_
     assert rivals(scores, heat, [heat, twin], large) == [twin]
 
 
+def lab_with_six(seed):
+    """A lab in which heat may also move each fifth of its readings by an amount of its own."""
+    lab = Lab(seed)
+    heat = lab.effects[lab.index("heat")].columns[0, 0]
+    parts = np.array([np.where(np.arange(heat.size) % 5 == k, heat, 0.0) for k in range(5)])
+    lab.effects.append(lab.effect("heat-apart", parts))
+    return lab, heat, parts
+
+
+def groups(lab, hidden, seed):
+    problem = lab.fitted(hidden, np.random.default_rng(seed))
+    found = diagnose(problem, lab.effects, rng=np.random.default_rng(seed), draws=199)
+    return [names for names in found.indistinguishable if "heat-apart" in names], found
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_discover_pairs_an_effect_that_holds_another_is_no_rival_of_it_for_nothing(seed):
+    lab, heat, _ = lab_with_six(60 + seed)
+    named, found = groups(lab, 12.0 * heat, seed)
+    assert found.explained_by[0] == "heat"
+    assert named == []
+
+
+def test_discover_pairs_an_effect_that_holds_another_is_named_where_its_own_part_shows():
+    lab, _, parts = lab_with_six(60)
+    _, found = groups(lab, np.array([14.0, 3.0, 10.0, -4.0, 9.0]) @ parts, 0)
+    assert found.explained_by[0] == "heat-apart"
+
+
 def judged(amplitude, seed):
     """Diagnosis of a lab with a wave in time that no effect of the catalogue makes."""
     lab = Lab(40 + seed)
