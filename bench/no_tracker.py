@@ -11,7 +11,9 @@ radius and rods are equal, so that the printer's model is complete.
 """
 
 import argparse
+import re
 from dataclasses import dataclass
+from importlib.resources import files
 
 import numpy as np
 
@@ -21,6 +23,7 @@ from calib.arrays import Array, IntArray
 from calib.identify import Fit, fit
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
+from calib.mechanism.parse import parse_machine
 from calib.mechanism.rigid import exponential
 from calib.mechanism.solve import forward, inverse
 from calib.model import Model
@@ -57,6 +60,17 @@ def drawn(machine: Machine, rng: np.random.Generator, *, plain: bool) -> Array:
         elif what == "radius":
             off[k] = off[names.index("tower1.radius")]
     return np.asarray(machine.nominal + off)
+
+
+def upright() -> Machine:
+    """The delta as a drawing with upright towers and rods that are equal in pairs has it."""
+    text = files("calib.machines").joinpath("delta.toml").read_text(encoding="utf-8")
+    text = text.replace(" ry:lean_in rx:lean_aside", "")
+    text = text.replace("tz:-length_b", "tz:-length_a")
+    text = re.sub(r"^(length_b|lean_in|lean_aside) = .*\n", "", text, flags=re.MULTILINE)
+    text = text.replace('["length_a", "length_b"]', '["length_a"]')
+    text = text.replace('parallelogram = ["length_a"]\n', "")
+    return parse_machine(text, "delta")
 
 
 def probed(machine: Machine) -> Array:
@@ -168,6 +182,11 @@ def one(machine: Machine, seed: int, q: Array, fresh: PoseSet, *, plain: bool) -
     ):  # fmt: skip
         run = parse_run(texts["header"], texts[what], actuators=3)
         found[name] = judged(fit(Model(stack(machine, [run]))), machine, fresh, true)
+    if plain:
+        drawing = upright()
+        run = parse_run(texts["header"], texts["calipers"], actuators=3)
+        name = "the same, upright"
+        found[name] = judged(fit(Model(stack(drawing, [run]))), drawing, fresh, true)
     return found
 
 
@@ -192,8 +211,9 @@ def main() -> None:
         print(f"{name:22}{columns[0]:8.1f}{columns[1]:8.1f}{columns[2]:15.1f}{columns[3]:12.1f}")
     for ours, theirs in (
         ("heights", "printer, heights"), ("heights + calipers", "printer, + calipers"),
+        ("the same, upright", "printer, + calipers"),
     ):  # fmt: skip
-        for column in ("plane", "height"):
+        for column in ("plane", "height") if ours in all_of[0] else ():
             pairs = [(getattr(r[ours], column), getattr(r[theirs], column)) for r in all_of]
             apart = np.array([a - b for a, b in pairs])
             # Of the median by its asymptotic spread, 1.2533 sigma / sqrt(n).

@@ -40,7 +40,7 @@ def test_the_information_of_heights_is_that_of_a_fit_to_heights() -> None:
 
 
 def test_poses_are_chosen_for_heights(capsys) -> None:
-    asked = ["poses", "delta", "--heights", "--n", "12", "--candidates", "100", "--json"]
+    asked = ["poses", "delta", "--heights", "--n", "6", "--candidates", "40", "--json"]
     assert pkmcal(asked) == 0
     said = json.loads(capsys.readouterr().out)
     assert said["readings"] == "heights of the platform's origin, +-10 um (1 sigma)"
