@@ -124,7 +124,9 @@ def gates_of_proposal(
 def _in_this_frame(gates: Gates, fit: SavedFit, frame: Mapping[str, str]) -> GateChecked:
     """Whether the controller's poses mean what they meant while the runs were taken."""
     apart = frames_apart(fit.controller_frame, frame)
-    says = "; ".join(apart) or "its poses refer to what they did when it was measured"
+    says = "its poses refer to what they did when it was measured"
+    if apart:
+        says = f"{'; '.join(apart)}: set it as it was, at the controller and in the site file"
     return gates.check("frame", len(apart), "", says)
 
 
