@@ -38,6 +38,8 @@ HYPOTHESES = (
     slid_rows, held_actuator,
 )  # fmt: skip
 """What may explain readings that stand in no nest; the first that explains all is taken."""
+ONCE_MORE = {"station-moved", "smr-size", "range-step"}
+"""What a fit says in place of the one step of the frame that the nominal machine showed."""
 MOST_ROUNDS = 4
 """Hypotheses about places that may hold at once."""
 _Known = Mapping[str, Array]
@@ -56,7 +58,7 @@ def first_look(machine: Machine, runs: Sequence[Run]) -> Rows:
     BadInput
         For coordinates that are nowhere near the actuators' travel.
     """
-    remarks: list[Remark] = []
+    remarks: list[Remark] = _serials(runs)
     looked: list[Run] = []
     known: _Known = {}
     for run in runs:
@@ -72,6 +74,9 @@ def first_look(machine: Machine, runs: Sequence[Run]) -> Rows:
             shown = {}
         if len(parts) == 1:
             parts, of_misfit, more = look_at_misfit(machine, parts[0], shown, alone=len(runs) == 1)
+            if shown and any(one.name in ONCE_MORE for one in of_misfit):
+                of_places = [one for one in of_places if one.name != "station-moved"]
+                shown = {}
             shown = {**shown, **more}
         else:
             of_misfit = []
@@ -79,6 +84,26 @@ def first_look(machine: Machine, runs: Sequence[Run]) -> Rows:
         looked += parts
         known = shown
     return replace(stack(machine, looked), remarks=tuple(remarks), known=known)
+
+
+def _serials(runs: Sequence[Run]) -> list[Remark]:
+    """Runs of several machines of one kind, by their controllers' serial numbers."""
+    serials = list(dict.fromkeys(r.header.controller_serial for r in runs))
+    named = [serial for serial in serials if serial]
+    if len(named) < 2:
+        return []
+    return [
+        Remark(
+            "several-machines",
+            f"The runs are of several machines: serial numbers {', '.join(named)}",
+            (),
+            "[controller] serial differs from run to run",
+            "Fitted together, as if they were one machine",
+            "Fit the runs of each machine apart, or correct [controller] serial",
+            False,
+            runs[0].source,
+        )
+    ]
 
 
 def rows_alone(machine: Machine, run: Run) -> tuple[Run, list[Remark]]:

@@ -12,18 +12,19 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray
 from calib.effects import effect_named
-from calib.effects.tracker import rigid_motions
 from calib.errors import BadInput
 from calib.identify.fitting import Fit
 from calib.identify.staged import fit_effects
 from calib.look.bent import not_stated, rounded_commands, slip, slip_remark, table_frame
-from calib.look.scan import excess, prior_cost, scan, whitened, with_the_excluded
+from calib.look.scan import excess, prior_cost, scan, with_the_excluded
 from calib.look.seats import ALONG, lifted, normal_of, seated
+from calib.look.several import beyond_one_step, stepped_fit
 from calib.look.sigmas import sigmas_of_all
+from calib.look.steps import frame_step, step_remark
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import rotate
 from calib.runs.record import Run
-from calib.runs.remark import Remark, ranges
+from calib.runs.remark import Remark
 from calib.runs.stack import stack
 
 LOUD = 2.0
@@ -77,12 +78,19 @@ def look_at_misfit(
     if stated is not None:
         return [stated.run], [stated.remark], {}
     bent = prior_cost(fitted) > BENT * fitted.model.free.size
-    if known or (fitted.chi2_per_dof < LOUD and not bent):
+    if fitted.chi2_per_dof < LOUD and not bent:
         return [run], [], {}
-    found = _step(fitted) if alone else None
+    if known:
+        more = beyond_one_step(machine, run, fitted) if alone else None
+        return ([run], [], {}) if more is None else (more[0], [more[1]], {})
+    found = frame_step(fitted) if alone else None
     seat = _seat(fitted)
     if found is not None and (seat is None or found.fall > seat.fall):
-        return [run], [_step_remark(fitted, found)], {"frame-shift": found.values}
+        stepped = stepped_fit(machine, run, found.values)
+        more = None if stepped is None else beyond_one_step(machine, run, stepped)
+        if more is not None:
+            return more[0], [more[1]], {}
+        return [run], [step_remark(fitted, found)], {"frame-shift": found.values}
     slipped = slip(fitted) if alone else None
     if slipped is not None and (seat is None or slipped.fall > seat.fall):
         return [run], [slip_remark(fitted, slipped)], {"actuator-step": slipped.values}
@@ -101,63 +109,6 @@ def _fit(machine: Machine, run: Run, known: _Known) -> Fit | None:
         return fit_effects(rows, [effect_named(name, machine) for name in known])
     except BadInput:
         return None  # the fit that was asked for says it
-
-
-@dataclass(frozen=True, eq=False)
-class _Step:
-    """A frame that steps: the row, the values of ``frame-shift``, and what it explains."""
-
-    row: int
-    values: Array
-    fall: float
-
-
-def _step(fitted: Fit) -> _Step | None:
-    """A step of the base that explains most of the misfit, better than anything else that steps."""
-    situation, rows = fitted.linear.situation, fitted.model.rows
-    kept = np.flatnonzero(fitted.accepted)
-    inner = slice(LEAST, kept.size - LEAST + 1)
-    base = scan(fitted, whitened(fitted, rigid_motions(situation.base_point)))
-    fall = base.fall[inner]
-    if fall.size == 0:
-        return None
-    at = int(np.argmax(fall)) + LEAST
-    best = float(base.fall[at])
-    if best < max(FALL, SHARE * excess(fitted)):
-        return None
-    others = [situation.actuator_columns[[k]] for k in range(len(rows.machine.actuators))]
-    tool = rigid_motions(rows.nest) * rows.on_platform
-    turned = np.stack([rotate(situation.rotation, one) for one in tool])
-    others.append(np.einsum("ijn,kjn->kin", situation.whitened_frame, turned))
-    rivals = [scan(fitted, one[:, :, fitted.accepted]).fall[inner].max() for one in others]
-    drift = rigid_motions(situation.point) * rows.progress
-    slow = np.einsum("ijn,kjn->kin", situation.whitener, drift)[:, :, fitted.accepted]
-    rivals.append(scan(fitted, slow).fall[0])
-    if best < max(rivals) + CLEAR:
-        return None
-    row = int(kept[at])
-    moment = 0.5 * (rows.moment[kept[at - 1]] + rows.moment[row])
-    return _Step(row, np.concatenate([base.sizes[at], [moment, 1.0]]), best)
-
-
-def _step_remark(fitted: Fit, found: _Step) -> Remark:
-    rows = fitted.model.rows
-    middle = fitted.linear.situation.base_point.mean(axis=1)[:, None]
-    moved = np.tensordot(found.values[:6], rigid_motions(middle), axes=1)
-    size = float(np.linalg.norm(moved))
-    told = f"{size:.3g} mm" if size >= 1.0 else f"{1000 * size:.0f} um"
-    return Remark(
-        "station-moved",
-        f"The tracker or the base was moved during the run: by {told} before line "
-        f"{rows.line[found.row]} ({rows.time_s[found.row]:.0f} s)",
-        ranges(rows.line[found.row :], rows.line),
-        f"One step of the frame explains "
-        f"{100 * found.fall / max(excess(fitted), found.fall):.0f} % of the misfit",
-        "The step is in the model as frame-shift; nothing is excluded for it",
-        "Nothing, or begin a new run after the move; fasten what was moved",
-        True,
-        rows.runs[0].source,
-    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -190,6 +190,24 @@ def test_a_station_that_moved_twice_has_three_frames():
     assert fitted.chi2_per_dof < 1.6
 
 
+def test_a_station_that_moved_twice_by_little_has_three_frames():
+    name = "tracker moved twice"
+    rows = looked("hexapod", spoiled(MISTAKES[name], name, made("hexapod", "pose-by-pose")))
+    (remark,) = rows.remarks
+    assert remark.name == "station-moved"
+    assert len(rows.runs) == 3
+    assert fit_effects(rows, []).chi2_per_dof < 1.6
+
+
+def test_runs_of_two_machines_are_said_to_be_such():
+    run = made("hexapod", "pose-by-pose")
+    other = replace(run, header=replace(run.header, controller_serial="2"))
+    run = replace(run, header=replace(run.header, controller_serial="1"))
+    rows = first_look(machine_named("hexapod"), [run, other])
+    assert [one.name for one in rows.remarks] == ["several-machines"]
+    assert not settled(rows.remarks)
+
+
 def test_what_was_set_aside_stays_on_the_way_of_the_machine():
     mistake = MISTAKES["zeros at the start"]
     run = made("hexapod", "pose-by-pose")

@@ -1,0 +1,79 @@
+"""A step of the frame at some moment, told from all else that may step there."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib.arrays import Array
+from calib.effects.tracker import rigid_motions
+from calib.identify.fitting import Fit
+from calib.look.scan import excess, scan, whitened
+from calib.mechanism.rigid import rotate
+from calib.runs.remark import Remark, ranges
+
+FALL = 100.0
+"""Least fall of the cost by which a step is held."""
+SHARE = 0.6
+"""Least part of the misfit that a step must explain."""
+CLEAR = 30.0
+"""Fall by which it must beat what else could step at that moment."""
+LEAST = 3
+"""Readings on either side of a step."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrameStep:
+    """A frame that steps: the row, the values of ``frame-shift``, and what it explains."""
+
+    row: int
+    values: Array
+    fall: float
+
+
+def frame_step(fitted: Fit) -> FrameStep | None:
+    """A step of the base that explains most of the misfit, better than anything else that steps."""
+    situation, rows = fitted.linear.situation, fitted.model.rows
+    kept = np.flatnonzero(fitted.accepted)
+    inner = slice(LEAST, kept.size - LEAST + 1)
+    base = scan(fitted, whitened(fitted, rigid_motions(situation.base_point)))
+    fall = base.fall[inner]
+    if fall.size == 0:
+        return None
+    at = int(np.argmax(fall)) + LEAST
+    best = float(base.fall[at])
+    if best < max(FALL, SHARE * excess(fitted)):
+        return None
+    others = [situation.actuator_columns[[k]] for k in range(len(rows.machine.actuators))]
+    tool = rigid_motions(rows.nest) * rows.on_platform
+    turned = np.stack([rotate(situation.rotation, one) for one in tool])
+    others.append(np.einsum("ijn,kjn->kin", situation.whitened_frame, turned))
+    rivals = [scan(fitted, one[:, :, fitted.accepted]).fall[inner].max() for one in others]
+    drift = rigid_motions(situation.point) * rows.progress
+    slow = np.einsum("ijn,kjn->kin", situation.whitener, drift)[:, :, fitted.accepted]
+    rivals.append(scan(fitted, slow).fall[0])
+    if best < max(rivals) + CLEAR:
+        return None
+    row = int(kept[at])
+    moment = 0.5 * (rows.moment[kept[at - 1]] + rows.moment[row])
+    return FrameStep(row, np.concatenate([base.sizes[at], [moment, 1.0]]), best)
+
+
+def step_remark(fitted: Fit, found: FrameStep) -> Remark:
+    """What is said of a step of the frame."""
+    rows = fitted.model.rows
+    middle = fitted.linear.situation.base_point.mean(axis=1)[:, None]
+    moved = np.tensordot(found.values[:6], rigid_motions(middle), axes=1)
+    size = float(np.linalg.norm(moved))
+    told = f"{size:.3g} mm" if size >= 1.0 else f"{1000 * size:.0f} um"
+    return Remark(
+        "station-moved",
+        f"The tracker or the base was moved during the run: by {told} before line "
+        f"{rows.line[found.row]} ({rows.time_s[found.row]:.0f} s)",
+        ranges(rows.line[found.row :], rows.line),
+        f"One step of the frame explains "
+        f"{100 * found.fall / max(excess(fitted), found.fall):.0f} % of the misfit",
+        "The step is in the model as frame-shift; nothing is excluded for it",
+        "Nothing, or begin a new run after the move; fasten what was moved",
+        True,
+        rows.runs[0].source,
+    )
