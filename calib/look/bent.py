@@ -25,12 +25,16 @@ from calib.runs.stack import stack
 
 FALL = 100.0
 """Least fall of the cost by which such a hypothesis is held."""
-SLIP_SHARE, FRAME_SHARE = 0.7, 0.9
+SLIP_SHARE, FRAME_SHARE = 0.9, 0.9
 """Least part of what is too much that a slip, and a frame, must explain."""
 NOT_STATED = 40.0
 """Fall of the cost by which the machine file's values must be better than those stated."""
 LOUD = 2.0
 """Chi-square per degree of freedom up to which a fit is one of the whole record."""
+CLEAR = 20.0
+"""Fall by which a slip must beat a slow drift of the same actuator."""
+SLOW_S = (300.0, 1200.0, 4800.0)
+"""Time constants, s, with which an actuator may warm up."""
 LEAST = 3
 """Readings on either side of a step."""
 SMALLEST_MM = 0.3
@@ -69,8 +73,23 @@ def slip(fitted: Fit) -> Slip | None:
             best = Slip(int(kept[at]), k, values, fall)
     if best is None or best.fall < max(FALL, SLIP_SHARE * excess(fitted)):
         return None
+    if best.fall < _slow(fitted, best.actuator) + CLEAR:
+        return None
     late = fitted.model.rows.time_s >= best.values[-1]
     return best if 0 < int(late.sum()) < late.size else None
+
+
+def _slow(fitted: Fit, actuator: int) -> float:
+    """Fall of the cost if that actuator drifts slowly instead: it warms up, or creeps."""
+    rows = fitted.model.rows
+    temperature = rows.channels.get("structure_temp_C", rows.progress)
+    if not np.all(np.isfinite(temperature)):
+        temperature = rows.progress**2
+    shapes = [rows.progress, temperature - temperature.mean()]
+    shapes += [np.exp(-rows.time_s / tau) for tau in SLOW_S]
+    column = fitted.linear.situation.actuator_columns[actuator]
+    columns = np.stack([column * shape for shape in shapes])[:, :, fitted.accepted]
+    return float(scan(fitted, columns).fall[0])
 
 
 def slip_remark(fitted: Fit, found: Slip) -> Remark:
