@@ -10,6 +10,7 @@ import numpy as np
 
 from calib.arrays import Array
 from calib.effects.component import Effect, Signature, Situation
+from calib.effects.fading import time_constant
 from calib.runs.commanded import CommandedPath
 from calib.runs.stack import Rows
 from calib.unknown import Unknown
@@ -44,7 +45,7 @@ class Creep(Effect):
     def signature(self, situation: Situation, values: Array) -> Signature:
         """What is left of all changes, against them; and its derivative by tau."""
         path, at = situation.rows.path, situation.rows.at
-        share, tau = float(values[0]), float(values[1])
+        share, tau = float(values[0]), time_constant(values[1])
         left, by_age = left_of_changes(path, tau)
         slope = share * by_age[:, at] / tau**2
         return Signature(extension=-np.stack([left[:, at], slope]))

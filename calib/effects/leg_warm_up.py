@@ -9,6 +9,7 @@ import numpy as np
 
 from calib.arrays import Array
 from calib.effects.component import Effect, Signature, Situation, per_actuator
+from calib.effects.fading import time_constant
 from calib.effects.tracker import run_prefix
 from calib.effects.warm_up import WarmUp
 from calib.runs.stack import Rows
@@ -47,7 +48,7 @@ class LegWarmUp(Effect):
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """What is left of the warm-up; and its derivative by tau."""
-        rows, tau = situation.rows, float(values[-1])
+        rows, tau = situation.rows, time_constant(values[-1])
         count = len(rows.machine.actuators)
         left = np.exp(-rows.time_s / tau)
         each = per_actuator(np.tile(left, (count, 1)))

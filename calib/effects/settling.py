@@ -9,6 +9,7 @@ import numpy as np
 
 from calib.arrays import Array
 from calib.effects.component import Effect, Signature, Situation
+from calib.effects.fading import time_constant
 from calib.runs.stack import Rows
 from calib.unknown import Unknown
 
@@ -47,7 +48,7 @@ class Settling(Effect):
         step = situation.rows.step
         if values.size == 1:
             return Signature(extension=step[None])
-        delay, tau = _delays(situation.rows), float(values[1])
+        delay, tau = _delays(situation.rows), time_constant(values[1])
         decayed = step * np.exp(-delay / tau)
         return Signature(extension=np.stack([decayed, values[0] * decayed * delay / tau**2]))
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from calib.arrays import Array
 from calib.effects.component import Effect, Signature, Situation
+from calib.effects.fading import time_constant
 from calib.effects.tracker import run_prefix
 from calib.mechanism.axes import units_of
 from calib.runs.stack import Rows
@@ -58,7 +59,7 @@ class WarmUp(Effect):
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """What is left of the warm-up; and its derivative by tau."""
-        rows, tau = situation.rows, float(values[-1])
+        rows, tau = situation.rows, time_constant(values[-1])
         axes = rows.machine.axes
         left = np.exp(-rows.time_s / tau)
         shape = np.zeros((values.size, len(axes), rows.count))
