@@ -51,7 +51,7 @@ class Verbs(click.Group):
         """Import one verb."""
         if cmd_name not in self.list_commands(ctx):
             return None
-        command: click.Command = import_module(f"app.verbs.{_file(cmd_name).stem}").command
+        command: click.Command = import_module(f"app.verbs.{file_of(cmd_name).stem}").command
         command.name = cmd_name
         return command
 
@@ -77,7 +77,7 @@ class Verbs(click.Group):
                     formatter.write_dl([(verb, _says(verb)) for verb in here], col_max=16)
 
 
-def _file(verb: str) -> Path:
+def file_of(verb: str) -> Path:
     """The file of a verb; one that is a word of Python's has an underscore behind it."""
     path = VERBS / f"{verb}.py"
     return path if path.is_file() else VERBS / f"{verb}_.py"
@@ -85,7 +85,7 @@ def _file(verb: str) -> Path:
 
 def _says(verb: str) -> str:
     """First line of a verb's docstring, read without importing it."""
-    with _file(verb).open(encoding="utf-8") as source:
+    with file_of(verb).open(encoding="utf-8") as source:
         return source.readline().strip().strip('"').rstrip(".")
 
 

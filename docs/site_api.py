@@ -5,7 +5,7 @@ import re
 from importlib import import_module
 from pathlib import Path
 
-from app.cli import TASKS, pkmcal
+from app.cli import TASKS, file_of, pkmcal
 
 PACKAGES = ("pkmcal", "app.jobs", "calib")
 """The scripting interface, what it hands on, and the mathematics under it."""
@@ -58,7 +58,10 @@ def verbs() -> str:
         if here:
             lines += [task, "-" * len(task), ""]
         for name in here:
-            lines += [f".. click:: app.verbs.{name}:command", f"   :prog: pkmcal {name}"]
+            lines += [
+                f".. click:: app.verbs.{file_of(name).stem}:command",
+                f"   :prog: pkmcal {name}",
+            ]
             lines += ["   :nested: full", ""]
     return VERBS + "\n".join(lines)
 
