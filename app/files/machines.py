@@ -1,5 +1,6 @@
 """Where machine descriptions are found: shipped with the program, or in a file of the lab's."""
 
+from functools import cache
 from importlib import resources
 from pathlib import Path
 
@@ -36,8 +37,7 @@ def load_machine(name_or_path: str, relative_to: Path | None = None) -> Machine:
         If there is no such machine, or its file cannot be used.
     """
     if name_or_path in shipped_machines():
-        shipped = resources.files("calib.machines") / f"{name_or_path}.toml"
-        return parse_machine(shipped.read_text(encoding="utf-8"), f"{name_or_path}.toml")
+        return _shipped(name_or_path)
     path = (relative_to or Path()) / name_or_path
     if not path.is_file():
         raise BadInput(
@@ -49,3 +49,10 @@ def load_machine(name_or_path: str, relative_to: Path | None = None) -> Machine:
     machine = parse_machine(text, str(path))
     require_sound(machine, text)
     return machine
+
+
+@cache
+def _shipped(name: str) -> Machine:
+    """A shipped machine; nobody can change it, and what is derived from it is derived once."""
+    shipped = resources.files("calib.machines") / f"{name}.toml"
+    return parse_machine(shipped.read_text(encoding="utf-8"), f"{name}.toml")

@@ -7,6 +7,7 @@ shrunk about its centre until every pose is reachable, and what was found is sta
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -116,6 +117,7 @@ def _snake(dimensions: int) -> list[tuple[float, ...]]:
     return nodes
 
 
+@lru_cache(maxsize=8)
 def verification_poses(machine: Machine) -> VerificationGrid:
     """27 nodes x 8 orientations (216 poses) for a hexapod; fewer coordinates give fewer poses.
 

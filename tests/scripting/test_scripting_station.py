@@ -127,6 +127,7 @@ def test_a_job_that_was_stopped_is_gone_on_with(how: str, site: Path, tmp_path: 
                 station.stop()
             else:
                 signal.raise_signal(signal.SIGINT)
+                time.sleep(1.0)  # the call that waits looks up a few times a second
                 asked.set()
 
         stopping = threading.Thread(target=stop)
