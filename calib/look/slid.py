@@ -20,6 +20,8 @@ ENOUGH = 0.9
 def check_columns(places: Places) -> None:
     """Refuse a column of q that holds one number throughout; raises BadInput naming it."""
     on = np.flatnonzero(places.rows.on_platform)
+    if on.size == 0:
+        return
     still = np.ptp(places.rows.q[:, on], axis=1) == 0.0
     if (
         still.sum() == 1

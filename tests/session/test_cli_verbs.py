@@ -124,7 +124,7 @@ def test_an_interrupt_ends_with_4_and_resume_answers_one_json_object(
     mock_of: Callable[..., Mock], tmp_path: Path
 ) -> None:
     mock = mock_of("--smrs", "3")
-    asyncio.run(set_speed(mock, 0.02))
+    asyncio.run(set_speed(mock, 0.005))
     site = str(mock.site_file(tmp_path))
     command = ["measure", "--site", site, "--poses", two_poses(tmp_path), "--no-warm-up"]
     process = subprocess.Popen(
@@ -152,7 +152,7 @@ def test_a_closed_terminal_stops_the_machine_and_leaves_a_journal_to_resume(
     import pty
 
     mock = mock_of("--smrs", "3")
-    asyncio.run(set_speed(mock, 0.02))
+    asyncio.run(set_speed(mock, 0.005))
     site = str(mock.site_file(tmp_path))
     command = ["measure", "--site", site, "--poses", two_poses(tmp_path), "--no-warm-up"]
     code = "from app.cli import main; main()"
