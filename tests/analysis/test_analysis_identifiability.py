@@ -183,6 +183,7 @@ def test_a_pattern_without_a_parameter_is_named() -> None:
         matching(["leg1.L0"], ["leg9.*"])
 
 
+@pytest.mark.long
 def test_the_verb_answers_in_words_and_json() -> None:
     runner = CliRunner()
     words = runner.invoke(command, ["hexapod", "--no-base-nests"])

@@ -76,6 +76,7 @@ def test_the_whole_way_and_its_journal(tmp_path: Path) -> None:
     assert len(again.journal.lines) == len(pilot.journal.lines) + 2
 
 
+@pytest.mark.long
 def test_a_fault_is_raised_and_the_same_session_is_gone_on_with(tmp_path: Path) -> None:
     with pytest.raises(DeviceError):
         fly(tmp_path, Simulated(tmp_path, lost_at=0))

@@ -63,6 +63,7 @@ def middleman(station) -> Iterator[Middleman]:
     middleman.close()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lost", [b"t18A", b"t28A"])
 async def test_lost_frame_costs_time_and_nothing_else(middleman: Middleman, lost: bytes):
     controller = await CanopenController.connect("slcan", middleman.channel)
@@ -75,6 +76,7 @@ async def test_lost_frame_costs_time_and_nothing_else(middleman: Middleman, lost
     await controller.close()
 
 
+@pytest.mark.long
 async def test_silent_adapter_is_noticed_by_the_heartbeats(station, middleman: Middleman):
     controller = await CanopenController.connect("slcan", middleman.channel, silence_s=0.6)
     await controller.enable()
@@ -98,6 +100,7 @@ GARBLED = {
 }
 
 
+@pytest.mark.long
 async def test_damaged_frames_are_ignored_counted_and_told(
     middleman: Middleman, capfd: pytest.CaptureFixture[str]
 ):
@@ -123,6 +126,7 @@ async def test_damaged_frames_are_ignored_counted_and_told(
     assert "Traceback" not in capfd.readouterr().err
 
 
+@pytest.mark.long
 async def test_line_that_garbles_everything_is_lost_in_words_and_the_machine_stops(
     station, middleman: Middleman, capfd: pytest.CaptureFixture[str]
 ):

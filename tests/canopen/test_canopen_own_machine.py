@@ -32,6 +32,7 @@ def mine(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.long
 async def test_own_machine_is_found_with_its_own_numbers(mine: Path) -> None:
     eds = mine.with_name("mine_controller.eds")
     assert run(["machine", "eds", str(mine), "--out", str(eds)]) == 0

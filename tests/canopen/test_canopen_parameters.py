@@ -67,6 +67,7 @@ async def test_checksum_is_the_crc32_of_all_values_in_order(controller: CanopenC
     assert await controller.parameter_checksum() == expected != before
 
 
+@pytest.mark.long
 async def test_every_parameter_has_its_own_entry_with_the_value_of_the_block(
     controller: CanopenController,
 ):
@@ -140,6 +141,7 @@ async def test_write_that_does_not_take_effect_is_noticed(station, controller: C
         await controller.write_parameters({"leg4.B_z": 0.1, "leg5.B_z": 0.1})
 
 
+@pytest.mark.long
 async def test_write_that_breaks_off_can_be_undone(station, controller: CanopenController):
     snapshot = await controller.read_parameters()
     station.hands("fault", name="write-refused:leg4.L0")

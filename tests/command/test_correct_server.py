@@ -146,6 +146,7 @@ def test_clients_that_vanish_or_are_too_many_leave_the_others_alone(
     assert client.ask(do="forget") == {"ok": True}
 
 
+@pytest.mark.long
 def test_a_port_that_is_taken_is_bad_input(served: tuple[object, int], model: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "pkmcal", "correct", str(model), "--serve", str(served[1])],

@@ -14,6 +14,7 @@ HEAVY = {
 }  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("statement", HEAVY)
 def test_nothing_is_imported_that_is_not_used(statement: str) -> None:
     asked = f"import sys; {statement}; print(*sys.modules)"

@@ -91,6 +91,7 @@ def test_completeness_verb_is_a_task_has_a_page_and_explains_its_options(name: s
             assert option.help or option.required or option.show_default or option.default, option
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", IN_JSON)
 def test_completeness_verb_answers_by_its_schema(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

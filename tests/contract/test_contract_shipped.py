@@ -26,6 +26,7 @@ async def test_tracker(kind: str, law: Law) -> None:
         await law.run(bench)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", CONTROLLER_LAWS, ids=str)
 @pytest.mark.parametrize("kind", CONTROLLERS)
 async def test_controller(kind: str, law: Law, tmp_path: Path) -> None:
@@ -45,6 +46,7 @@ async def test_linuxcnc(law: Law, tmp_path: Path) -> None:
         await law.run(bench)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", MOTORS_LAWS, ids=str)
 @pytest.mark.parametrize("kind", MOTORS)
 async def test_motors(kind: str, law: Law) -> None:
@@ -56,6 +58,7 @@ async def test_motors(kind: str, law: Law) -> None:
         await law.run(bench)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", POSE_LAWS, ids=str)
 @pytest.mark.parametrize("kind", POSE_MOVERS)
 async def test_pose_mover(kind: str, law: Law) -> None:

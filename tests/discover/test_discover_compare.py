@@ -118,6 +118,7 @@ def test_pure_error_of_repeats():
     assert pure_error(noise, [None] * 600, 1800.0).dof == 0
 
 
+@pytest.mark.long
 def test_verb_answers_json_and_draws(tmp_path):
     answer = CliRunner().invoke(
         command, [str(RUNS / "backlash-leg-3"), "--json", "--out", str(tmp_path / "figures")]

@@ -20,6 +20,7 @@ def truth(name):
     return json.loads((RUNS / name / "truth.json").read_text())["hidden"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["no-effect", "backlash-leg-3", "screw-twist-and-heat"])
 def test_discover_examples_find_what_is_hidden_and_nothing_else(capsys, name):
     report = answer(capsys, "discover", str(RUNS / name))
@@ -46,6 +47,7 @@ def test_discover_examples_mystery_reaches_its_floor_by_falling_steps(capsys):
     assert report["adequate"]
 
 
+@pytest.mark.long
 def test_discover_examples_diagnosis_of_backlash(capsys):
     report = answer(capsys, "diagnose", str(RUNS / "backlash-leg-3"))
     assert report["format"] == "pkm-diagnosis/1"
@@ -60,6 +62,7 @@ def test_discover_examples_diagnosis_of_backlash(capsys):
     assert "backlash" in report["advice"]
 
 
+@pytest.mark.long
 def test_discover_examples_diagnosis_promises_what_the_refit_keeps(capsys):
     before = answer(capsys, "diagnose", str(RUNS / "backlash-leg-3"))["candidates"][0]
     after = answer(capsys, "fit", str(RUNS / "backlash-leg-3"), "--add", "backlash")

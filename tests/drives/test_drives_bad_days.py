@@ -41,6 +41,7 @@ async def test_a_fault_that_is_reset_late_is_waited_for(bare):
     assert (await motors.state()).enabled
 
 
+@pytest.mark.long
 async def test_a_homing_does_not_end_by_the_bits_of_the_one_before(bare):
     motors = await bare.ready()
     await motors.move_actuators(FAR)
@@ -52,6 +53,7 @@ async def test_a_homing_does_not_end_by_the_bits_of_the_one_before(bare):
     assert bare.world.legs[0].position() == pytest.approx(0.0, abs=1e-4)
 
 
+@pytest.mark.long
 async def test_a_homing_that_cannot_be_made_is_no_success(bare):
     motors = await bare.ready()
     await motors.move_actuators(FAR)
@@ -68,6 +70,7 @@ async def test_homing_where_it_stands_already(bare):
     assert (await motors.state()).actuators[2].homed
 
 
+@pytest.mark.long
 async def test_a_stop_is_a_whole_frame_of_the_drive_s_own_mapping(bare):
     motors = await bare.ready()
     with can.Bus(interface="slcan", channel=bare.channel, sleep_after_open=0) as listener:
@@ -136,6 +139,7 @@ async def test_a_motor_that_runs_the_wrong_way_is_stopped_at_once(bare):
     assert -3.0 < bare.world.legs[0].position() < 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("on_silence", "state"),
     [
@@ -191,6 +195,7 @@ async def test_references_by_another_object_and_by_this_program_alone(bare):
     assert not any(actuator.homed for actuator in (await again.state()).actuators)
 
 
+@pytest.mark.long
 async def test_set_points_under_sync_arrive_together_and_are_held(start_bare, bare: Bare):
     motors = await bare.ready(mode="cyclic")
     await motors.move_actuators(FAR)

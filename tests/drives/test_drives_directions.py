@@ -91,6 +91,7 @@ def test_one_that_moves_nothing_and_one_that_cannot_be_seen():
     assert unsaid == ["b", "c"]
 
 
+@pytest.mark.long
 def test_a_flipped_sign_ends_a_session_before_its_first_large_move(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):

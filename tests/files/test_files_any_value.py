@@ -70,6 +70,7 @@ def places(node: object) -> list[tuple[object, object]]:
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", READERS)
 def test_any_value_under_any_key_is_read_or_named(name: str) -> None:
     text, read = READERS[name]

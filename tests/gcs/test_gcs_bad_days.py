@@ -113,6 +113,7 @@ async def test_fault_that_stands_at_connect_is_known_at_once(
 # ------------------------------------------------------------ the controller
 
 
+@pytest.mark.long
 async def test_silent_controller_is_noticed_and_has_stopped(
     bench: Bench, controller: GcsController
 ):
@@ -134,6 +135,7 @@ async def test_silent_controller_is_noticed_and_has_stopped(
     await go(controller, HOME)
 
 
+@pytest.mark.long
 async def test_garbage_is_named(bench: Bench, controller: GcsController):
     bench.world.faults.inject("controller-garbage")
     with pytest.raises((ProtocolError, Silence)):

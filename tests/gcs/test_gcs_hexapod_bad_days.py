@@ -126,6 +126,7 @@ async def test_a_reference_move_that_is_stopped(bench: HexapodBench) -> None:
         await homing
 
 
+@pytest.mark.long
 async def test_silence_in_motion_is_a_fault(bench: HexapodBench) -> None:
     await slow(bench)
     bench.world.faults.inject("controller-silent")

@@ -50,6 +50,7 @@ def test_identify_exact_readings_leave_no_residual(simulated):
     assert found.chi2 < 5.0
 
 
+@pytest.mark.long
 def test_identify_jacobian_with_every_effect_against_central_differences(example):
     whole = example("backlash-leg-3")
     frames = fit(Model(whole)).linear.state

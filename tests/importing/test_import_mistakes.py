@@ -48,6 +48,7 @@ MISREAD: dict[str, tuple[Callable[[Run], Run], str]] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", MISREAD)
 def test_another_way_of_writing_is_named(bench, case: str) -> None:
     change, said = MISREAD[case]

@@ -128,6 +128,7 @@ REFUSED = {
 """Mistakes that make of a record that of another machine."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_would_be_another_machine_is_refused_in_words(name):
     machine = REFUSED[name]
@@ -135,6 +136,7 @@ def test_what_would_be_another_machine_is_refused_in_words(name):
         looked(machine, spoiled(MISTAKES[name], name, made(machine, "pose-by-pose")))
 
 
+@pytest.mark.long
 def test_rows_that_slid_are_put_back():
     name = "x, y, z one row late from the middle on"
     rows = looked("hexapod", spoiled(MISTAKES[name], name, made("hexapod", "pose-by-pose")))
@@ -190,6 +192,7 @@ def test_a_station_that_moved_twice_has_three_frames():
     assert fitted.chi2_per_dof < 1.6
 
 
+@pytest.mark.long
 def test_a_station_that_moved_twice_by_little_has_three_frames():
     name = "tracker moved twice"
     rows = looked("hexapod", spoiled(MISTAKES[name], name, made("hexapod", "pose-by-pose")))
@@ -239,6 +242,7 @@ def test_angles_in_another_unit_are_refused_in_words(factor, told):
         looked("ptm", replace(run, q=factor * run.q))
 
 
+@pytest.mark.long
 def test_many_excluded_readings_are_never_silent():
     run = made("hexapod", "pose-by-pose")
     generator = np.random.default_rng(3)

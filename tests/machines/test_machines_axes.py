@@ -114,6 +114,7 @@ def test_unknowns_of_all_effects_are_unique(rows_of, name):
     assert max(counts.values()) == 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "effect"),
     [
@@ -202,6 +203,7 @@ def test_an_effect_file_that_names_axes_leaves_the_others_alone(rows_of):
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", MADE)
 def test_columns_of_effects_agree_with_differences(rows_of, name):
     rows = rows_of(name)

@@ -257,6 +257,7 @@ def rms(machine: Machine, truth: Array, values: Array, fresh: Configuration) -> 
     return float(np.sqrt(left[0])), float(np.sqrt(left[1])) / DEG
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [11, 12, 13])
 def test_calibration_with_all_errors_and_priors(seed: int) -> None:
     own, truth, values, fresh = calibrated(None, seed)

@@ -86,6 +86,7 @@ def volume_weights(found: Configuration, weights: Array) -> Array:
     return weights * np.abs(np.linalg.det(np.moveaxis(moves, -1, 0)))
 
 
+@pytest.mark.long
 def test_workspace() -> None:
     nodes, weights = gauss_nodes(14)
     assert volume_weights(at_sliders(nodes), weights).sum() == pytest.approx(1.30090e6, rel=1e-4)

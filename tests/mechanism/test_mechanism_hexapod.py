@@ -47,6 +47,7 @@ def test_leg_length_at_220_mm(hexapod: Machine) -> None:
     assert q == pytest.approx(np.full(6, 230.7148097226), abs=1e-9)
 
 
+@pytest.mark.long
 def test_chain_gives_the_lengths_of_the_closed_equations(hexapod: Machine) -> None:
     configuration = reachable(hexapod, 10, seed=5)
     q = hexapod.coordinates(configuration.extension)

@@ -95,6 +95,7 @@ def complex_step(
     return np.concatenate([position, omega])
 
 
+@pytest.mark.long
 def test_jacobians_against_complex_step(machine: Machine, configuration: Configuration) -> None:
     few = configuration.take(slice(0, 6))
     jacobians = pose_jacobians(machine, few)

@@ -1,6 +1,7 @@
 """Laws of chains that nobody has drawn: composed as matrices would be, with true derivatives."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -99,6 +100,7 @@ def test_mechanism_chain_is_the_product_of_its_elements(elements, seed):
         np.testing.assert_allclose(there.poses.rotation[:, :, pose], turn, atol=1e-9)
 
 
+@pytest.mark.long
 @SERIOUS
 @given(serial_chains(), st.integers(0, 2**32 - 1))
 def test_mechanism_chain_has_the_derivatives_of_its_differences(elements, seed):

@@ -182,6 +182,7 @@ def test_ends_cleanly_on_a_signal(name: str) -> None:
     assert (process.returncode, errors) == (0, "")
 
 
+@pytest.mark.long
 def test_bad_input_ends_with_2(tmp_path: Path) -> None:
     hidden = tmp_path / "hidden.toml"
     hidden.write_text('[hidden]\n"backlash.leg9" = 0.01\n')
@@ -208,6 +209,7 @@ def test_site_file_and_hidden_effects(tmp_path: Path) -> None:
     assert process.returncode == 0
 
 
+@pytest.mark.long
 def test_controller_with_a_memory_keeps_its_serial_number(tmp_path: Path) -> None:
     def serial(*arguments: str) -> str:
         process = launch("--json", "--seed", "9", "--until-stdin-closes", *arguments)

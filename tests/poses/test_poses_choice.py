@@ -112,6 +112,7 @@ def test_random_poses_give_what_the_notes_say(machine: Machine) -> None:
         assert np.median(found) == pytest.approx(expected, abs=within)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("criterion", "priors", "wanted"), [("I", True, 7.0), ("I", False, 7.6), ("D", False, 8.1)]
 )

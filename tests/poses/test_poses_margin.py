@@ -29,6 +29,7 @@ def named(machine: Machine, parameters: Array) -> dict[str, float]:
     return {p.name: float(v) for p, v in zip(machine.parameters, parameters, strict=True)}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["hexapod", "tripod"])
 def test_what_is_kept_free_is_enough_for_machines_within_tolerance(name: str) -> None:
     machine = load_machine(name)
@@ -47,6 +48,7 @@ def test_what_is_kept_free_is_enough_for_machines_within_tolerance(name: str) ->
     assert outside > 0
 
 
+@pytest.mark.long
 def test_the_whole_way_is_accepted_by_calibrated_controllers() -> None:
     machine = load_machine("hexapod")
     chosen = choose_poses("hexapod", 29, candidates=150)
@@ -56,6 +58,7 @@ def test_the_whole_way_is_accepted_by_calibrated_controllers() -> None:
         check_waypoints(machine, named(machine, within_tolerance(machine, seed)), path, labels)
 
 
+@pytest.mark.long
 def test_the_grid_is_reached_by_machines_within_tolerance() -> None:
     machine = load_machine("tripod")
     grid = verification_poses(machine).pose_set

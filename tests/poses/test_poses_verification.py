@@ -7,6 +7,7 @@ from calib.mechanism.solve import forward
 from calib.poses import verification_poses
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", shipped_machines())
 def test_every_verification_pose_is_within_limits(name: str) -> None:
     grid = verification_poses(load_machine(name))

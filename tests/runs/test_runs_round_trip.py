@@ -110,6 +110,7 @@ def assert_same(first, second, skip=()):
             np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.long
 @given(runs())
 @settings(max_examples=80, deadline=None, derandomize=True)
 def test_a_run_written_is_read_as_the_same_run(run):
@@ -130,6 +131,7 @@ def test_fewer_digits_are_the_same_run_to_those_digits(run, places):
     assert list(again.channels) == list(run.channels)
 
 
+@pytest.mark.long
 @given(runs())
 @settings(max_examples=20, deadline=None, derandomize=True)
 def test_line_ends_and_byte_order_marks_change_nothing(run):

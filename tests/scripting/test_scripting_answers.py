@@ -82,6 +82,7 @@ QUESTIONS: dict[str, tuple[Callable[[str], Report], Callable[[str], list[str]]]]
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("question", QUESTIONS)
 def test_script_and_verb_answer_alike(
     question: str, run_folder: Path, capsys: pytest.CaptureFixture[str]

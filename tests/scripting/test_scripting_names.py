@@ -45,6 +45,7 @@ def simulated(folder: Path) -> Path:
     return folder / "run"
 
 
+@pytest.mark.long
 def test_files_in_the_current_folder_are_passed_by(tmp_path: Path) -> None:
     lab = lab_of(tmp_path / "lab", EVERY_NAME)
     run = simulated(lab)
@@ -53,6 +54,7 @@ def test_files_in_the_current_folder_are_passed_by(tmp_path: Path) -> None:
     assert json.loads(fitted.stdout)["format"] == "pkm-fit/1"
 
 
+@pytest.mark.long
 def test_a_mock_starts_and_ends_in_such_a_folder(tmp_path: Path) -> None:
     lab = lab_of(tmp_path / "lab", EVERY_NAME)
     mock = ["mock", "hexapod", "--json", "--until-stdin-closes"]
@@ -62,6 +64,7 @@ def test_a_mock_starts_and_ends_in_such_a_folder(tmp_path: Path) -> None:
         assert json.loads(done.stdout)["format"] == "pkm-mock/1"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("module", ["app", "pkmcal"])
 def test_python_m_passes_them_by_too(module: str, tmp_path: Path) -> None:
     lab = lab_of(tmp_path / "lab", tuple(name for name in PARTS if name != module))
@@ -87,6 +90,7 @@ def test_the_current_folder_on_the_path_by_an_empty_entry_is_named(tmp_path: Pat
     assert "calib.py" in done.stderr
 
 
+@pytest.mark.long
 def test_a_folder_of_data_with_such_a_name_harms_nobody(tmp_path: Path) -> None:
     for name in PARTS:
         (tmp_path / name).mkdir()

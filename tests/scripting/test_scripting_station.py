@@ -107,6 +107,7 @@ def test_script_and_verb_verify_alike(
     assert ours.truth.position_peak_um == pytest.approx(said["truth"]["position_peak_um"], rel=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("how", ["stop", "interrupt"])
 def test_a_job_that_was_stopped_is_gone_on_with(how: str, site: Path, tmp_path: Path) -> None:

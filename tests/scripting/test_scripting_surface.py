@@ -166,6 +166,7 @@ def test_the_import_is_light() -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.long
 def test_no_function_needs_the_screens_or_the_command_line() -> None:
     code = (
         "import sys, pkmcal; [getattr(pkmcal, name) for name in pkmcal.__all__];"
@@ -196,6 +197,7 @@ def test_code_in_the_guide_uses_what_there_is(number: int) -> None:
     assert set(used) <= set(pkmcal.__all__)
 
 
+@pytest.mark.long
 def test_the_first_code_in_the_guide_runs_as_it_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

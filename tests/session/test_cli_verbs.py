@@ -180,6 +180,7 @@ def test_a_closed_terminal_stops_the_machine_and_leaves_a_journal_to_resume(
     assert json.loads(again.stdout)["readings"] == 14
 
 
+@pytest.mark.long
 def test_a_refusing_gate_ends_with_5(mock_of: Callable[..., Mock], tmp_path: Path) -> None:
     site = str(mock_of("--smrs", "3").site_file(tmp_path))
     far = tmp_path / "far.csv"

@@ -74,6 +74,7 @@ def still(mock: Mock) -> bool:
     return not mock.hands("truth")["moving"]
 
 
+@pytest.mark.long
 async def test_a_beam_broken_in_the_middle_of_a_dwell_costs_no_reading(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:
@@ -87,6 +88,7 @@ async def test_a_beam_broken_in_the_middle_of_a_dwell_costs_no_reading(
     assert "reverified" in kinds  # the last good reference was read again
 
 
+@pytest.mark.long
 async def test_a_beam_that_stays_away_ends_unattended_and_can_be_gone_on_with(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:
@@ -102,6 +104,7 @@ async def test_a_beam_that_stays_away_ends_unattended_and_can_be_gone_on_with(
     assert await run(await resumed(session)) == 14
 
 
+@pytest.mark.long
 async def test_an_smr_in_the_wrong_hole_is_seen_and_carried_again(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:
@@ -132,6 +135,7 @@ async def test_an_smr_moved_during_the_pass_is_caught_by_the_next_reading(
     assert all(r.miss_mm < 4.0 for r in heard.of(ev.ReadingTaken) if r.pose_label)
 
 
+@pytest.mark.long
 async def test_two_smrs_exchanged_do_no_harm_and_an_empty_nest_is_named(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:
@@ -163,6 +167,7 @@ async def test_a_controller_with_other_parameters_never_moves(
     assert heard.of(ev.Fault)[0].remedy
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("fault", "error"),
     [("drive-fault:3", DriveFault), ("heartbeat-silent:4", HeartbeatLost)],
@@ -187,6 +192,7 @@ async def test_a_drive_that_fails_stops_the_machine_and_the_session_goes_on_late
     assert len(heard.of(ev.ReadingTaken)) == 14 >= taken
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("which", ["tracker", "controller"])
 async def test_a_tcp_reset_ends_safely_and_resumes(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path, which: str
@@ -203,6 +209,7 @@ async def test_a_tcp_reset_ends_safely_and_resumes(
     assert await run(await resumed(session)) == 14
 
 
+@pytest.mark.long
 async def test_stop_works_during_a_move(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:
@@ -230,6 +237,7 @@ async def test_stop_works_during_a_move(
     assert heard.of(ev.Stopped)
 
 
+@pytest.mark.long
 async def test_pause_holds_between_steps_and_skip_leaves_one_out(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:
@@ -273,6 +281,7 @@ async def test_a_pose_out_of_reach_is_refused_before_anything_moves(
     assert not heard.of(ev.PoseCommanded)
 
 
+@pytest.mark.long
 async def test_a_machine_in_use_is_refused_naming_the_owner(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:
@@ -286,6 +295,7 @@ async def test_a_machine_in_use_is_refused_naming_the_owner(
     assert await run(await resumed(session)) == 14
 
 
+@pytest.mark.long
 async def test_a_tracker_that_forgot_itself_is_initialised_again(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:
@@ -295,6 +305,7 @@ async def test_a_tracker_that_forgot_itself_is_initialised_again(
     assert await run(session) == 14
 
 
+@pytest.mark.long
 async def test_a_knocked_tracker_stand_makes_the_session_begin_anew(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:
@@ -322,6 +333,7 @@ def _notes(session: Session) -> list[tuple[float, str, str]]:
         journal.close()
 
 
+@pytest.mark.long
 async def test_a_person_is_asked_to_carry_and_told_what_was_wrong(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:
@@ -347,6 +359,7 @@ async def test_a_person_is_asked_to_carry_and_told_what_was_wrong(
     assert "no SMR is seen there" in asked[2] or "nest 5 where nest 4 was expected" in asked[2]
 
 
+@pytest.mark.long
 async def test_air_outside_the_band_holds_the_job_and_then_ends_it(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:
@@ -361,6 +374,7 @@ async def test_air_outside_the_band_holds_the_job_and_then_ends_it(
     assert not [r for r in heard.of(ev.ReadingTaken) if r.pose_label]
 
 
+@pytest.mark.long
 async def test_a_full_disk_is_a_sentence_and_the_session_goes_on_when_there_is_room(
     mock_of: Callable[..., Mock], tmp_path: Path, heard: Heard
 ) -> None:

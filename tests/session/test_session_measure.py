@@ -69,6 +69,7 @@ def delays_are_from_arrival_to_dwell(
         assert sent - rounding <= time_s - delay_s <= told + rounding
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("order", "smrs", "moves"), [("nest-by-nest", "1", 18), ("pose-by-pose", "3", 6)]
 )
@@ -103,6 +104,7 @@ async def test_a_campaign_leaves_a_run_that_loads_and_fits(
     delays_are_from_arrival_to_dwell(loaded.run, session, arrived)
 
 
+@pytest.mark.long
 async def test_base_nests_without_their_own_smrs_are_visited_with_the_one(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:

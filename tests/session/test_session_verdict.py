@@ -44,6 +44,7 @@ def stopped_verification(mock: Mock, folder: Path, before: Path, save: Path) -> 
     return asyncio.run(begun())
 
 
+@pytest.mark.long
 def test_a_verification_that_was_stopped_ends_with_its_verdict(
     mock_of: Callable[..., Mock], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

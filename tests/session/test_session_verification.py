@@ -21,6 +21,7 @@ async def verified(mock: Mock, folder: Path) -> Verification:
         await session.close()
 
 
+@pytest.mark.long
 async def test_the_tracker_sees_the_true_error_to_within_its_noise(
     mock_of: Callable[..., Mock], tmp_path: Path
 ) -> None:
@@ -34,6 +35,7 @@ async def test_the_tracker_sees_the_true_error_to_within_its_noise(
     assert 1.0 < found.noise_peak_um < 20.0
 
 
+@pytest.mark.long
 async def test_a_perfect_machine_shows_what_noise_alone_predicts(
     mock_of: Callable[..., Mock], tmp_path: Path
 ) -> None:

@@ -81,6 +81,7 @@ async def test_the_last_reading_once_more_is_none_where_the_smr_is_elsewhere(
     assert again.xyz == two
 
 
+@pytest.mark.long
 async def test_a_tracker_that_tells_zero_for_ever_ends_in_a_fault(work: Work) -> None:
     with_tracker(work, ScriptedTracker((0.0, 0.0, 0.0)))
     with pytest.raises(NotReady, match="exactly 0, 0, 0"):

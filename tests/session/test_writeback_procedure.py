@@ -100,6 +100,7 @@ def small_change(station: Station, by: float = 0.02) -> SavedFit:
     return SavedFit("made.toml", "hexapod", (), estimates, quality, covariance, False)
 
 
+@pytest.mark.long
 async def test_a_value_that_reads_back_differently_restores_the_snapshot(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:
@@ -146,6 +147,7 @@ async def test_a_refused_store_restores_the_snapshot(
     assert held.values["leg1.L0"] == 230.715
 
 
+@pytest.mark.long
 async def test_a_restore_that_fails_latches_and_blocks_motion_until_undone(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:
@@ -173,6 +175,7 @@ async def test_a_restore_that_fails_latches_and_blocks_motion_until_undone(
         await station.close()
 
 
+@pytest.mark.long
 async def test_check_poses_that_are_worse_put_everything_back(
     mock_of: Callable[..., Mock], heard: Heard, tmp_path: Path
 ) -> None:

@@ -51,6 +51,7 @@ async def _with_foreign_client(bench: Bench, work: Callable[[CommandSync], Any])
     return await asyncio.to_thread(run)
 
 
+@pytest.mark.long
 async def test_foreign_client_measures_on_our_mock(bench: Bench) -> None:
     nest = bench.nest("3")
 

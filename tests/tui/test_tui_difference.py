@@ -1,5 +1,6 @@
 """What is sent makes of the lines that stand there the lines that should; equal cells stay."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.segment import Segment
@@ -42,11 +43,13 @@ def after(shown: list[Strip], wanted: list[Strip]) -> list[list[Cell]]:
     return screen[: len(wanted)]
 
 
+@pytest.mark.long
 @given(lines(), lines())
 def test_the_changes_make_the_wanted_lines(shown: list[Strip], wanted: list[Strip]) -> None:
     assert after(shown, wanted) == [cells(line) for line in wanted]
 
 
+@pytest.mark.long
 @given(lines())
 def test_nothing_is_sent_for_what_stands_there(shown: list[Strip]) -> None:
     assert list(changes(shown, shown)) == []

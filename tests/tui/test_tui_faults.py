@@ -17,6 +17,7 @@ def own_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 # python-can's receiving thread ends with an exception of its own when its link goes.
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 async def test_station_that_dies_in_a_run(tmp_path: Path) -> None:
     bench = Workbench(root=tmp_path / "sessions")

@@ -25,6 +25,7 @@ def stops(bench: Workbench) -> int:
     return sum(line.text.startswith("STOP") for line in bench.desk.picture.log)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "opens", ["f1", "m", "ctrl+p", None], ids=["help", "input", "palette", "-"]
 )
@@ -50,6 +51,7 @@ async def test_stop_key_works_in_a_question(bench: Workbench, tmp_path: Path) ->
         assert stops(bench) == 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", [(80, 24), (160, 48)])
 async def test_stop_key_is_in_sight_on_every_screen(
     bench: Workbench, size: tuple[int, int]
@@ -98,6 +100,7 @@ async def test_question_closes_when_somebody_else_answers(bench: Workbench, tmp_
         assert isinstance(bench.screen, Face)
 
 
+@pytest.mark.long
 async def test_a_question_opens_though_an_earlier_one_had_its_name(
     bench: Workbench, tmp_path: Path
 ) -> None:
@@ -114,6 +117,7 @@ async def test_a_question_opens_though_an_earlier_one_had_its_name(
         assert isinstance(bench.screen, Ask)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("proposed", "focused"), [(None, None), ("stop", "stop")])
 async def test_enter_gives_the_proposed_answer_and_no_other(
     bench: Workbench, tmp_path: Path, proposed: str | None, focused: str | None
@@ -175,6 +179,7 @@ def test_every_key_is_explained_and_none_is_used_twice_on_a_screen() -> None:
         assert len(face.about) > 100
 
 
+@pytest.mark.long
 async def test_palette_runs_an_action_of_another_screen(bench: Workbench) -> None:
     async with bench.run_test(size=(80, 24)) as pilot:
         await pilot.press("ctrl+p")
@@ -200,6 +205,7 @@ async def test_help_lists_the_keys_of_the_screen(bench: Workbench) -> None:
         assert "STOP" in shown
 
 
+@pytest.mark.long
 async def test_leaving_asks_while_a_job_runs(bench: Workbench) -> None:
     async with bench.run_test(size=(80, 24)) as pilot:
         waiting = asyncio.Event()

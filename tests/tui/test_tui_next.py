@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 import tui_stream as stream
 
 from app.tui.next_step import NextLine, job_steps, next_of
@@ -11,6 +12,7 @@ from app.tui.program import FACES, Workbench
 from app.tui.verify import aligned
 
 
+@pytest.mark.long
 async def test_every_screen_says_what_comes_next(tmp_path: Path) -> None:
     bench = Workbench(root=tmp_path)
     async with bench.run_test(size=(80, 24)) as pilot:
