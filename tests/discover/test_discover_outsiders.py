@@ -45,7 +45,6 @@ def answer(capsys, *arguments):
 
 def test_discover_outsiders_two_machines_are_told_in_words(capsys):
     runs = [CLEAN, RUNS / "backlash-leg-3"]
-    assert "do not agree" in answer(capsys, "diagnose", *runs)["advice"]
     assert "do not agree" in answer(capsys, "fit", *runs)["remarks"][0]
 
 
