@@ -19,7 +19,7 @@ from calib.mechanism.description import Machine
 from calib.mechanism.limits import Margin
 from calib.poses.design import CANDIDATES, TABLE, Design, design_poses
 from calib.poses.information import Accuracy
-from calib.poses.margin import tolerance_margin
+from calib.poses.margin import stroke_margin
 from calib.poses.readings import HAN_2020, DirectionReadings, NestReadings, PoseNoise, Readings
 from calib.poses.verification import VerificationGrid, verification_poses
 
@@ -310,8 +310,7 @@ def _margin(machine: Machine, site_file: Path | None, margin_mm: float | None) -
         margin_mm = (load_site(site_file).limits if site_file else Limits()).margin_mm
     if margin_mm < 0.0:
         raise BadInput(f"--margin-mm is {margin_mm:g}", remedy="Give 0 or more.")
-    strokes = np.array([actuator.unit == "mm" for actuator in machine.actuators])
-    return tolerance_margin(machine).widened(margin_mm * strokes)
+    return stroke_margin(machine, margin_mm)
 
 
 def _accuracy(accuracy: Accuracy) -> dict[str, float]:

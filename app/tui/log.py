@@ -69,8 +69,8 @@ class LogLines(ScrollView, can_focus=True):
         what = "warnings and faults" if self.only_warnings else "everything"
         self.border_title = f"Log: {what}"
         self.refresh()
-        if at_end:
-            self.scroll_end(animate=False)
+        if at_end:  # the new size counts once it is laid out
+            self.call_after_refresh(self.scroll_end, animate=False)
 
     @property
     def _width(self) -> int:

@@ -1,7 +1,6 @@
 """From what the operator wishes to measure to the plan: poses chosen or read, steps expanded."""
 
 import asyncio
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -14,13 +13,13 @@ from textual.content import Content
 from textual.widgets import Button, Checkbox, Input, RadioButton, RadioSet, Static
 
 from app.files.pose_table import Pose, read_poses
-from app.files.poses import full_poses, read_pose_file
+from app.files.poses import full_poses, nest_matrix, read_pose_file
 from app.files.site import Site
 from app.session import Plan, PlanOptions, measure_plan
 from app.session.plans import Order
 from app.tui.dialogs import Dialog
-from calib.arrays import Array
 from calib.poses import design_poses
+from calib.poses.margin import stroke_margin
 from calib.poses.readings import NestReadings
 
 SIGMA_MM = 0.005
@@ -55,14 +54,12 @@ async def _poses(site: Site, wish: str) -> dict[str, Pose]:
 
 
 def _choose(site: Site, count: int) -> dict[str, Pose]:
-    readings = NestReadings(_matrix(site.platform_nests), SIGMA_MM, _matrix(site.base_nests))
-    design = design_poses(site.machine, readings, count, np.random.default_rng(SEED), counts=())
+    nests, base = nest_matrix(site.platform_nests), nest_matrix(site.base_nests)
+    design = design_poses(
+        site.machine, NestReadings(nests, SIGMA_MM, base), count, np.random.default_rng(SEED),
+        counts=(), margin=stroke_margin(site.machine, site.limits.margin_mm),
+    )  # fmt: skip
     return full_poses(design.labels, design.pose_set)
-
-
-def _matrix(nests: Mapping[str, tuple[float, ...]]) -> Array:
-    """Nests as (3, M), mm."""
-    return np.array(list(nests.values()), float).T
 
 
 class Radio(RadioButton):

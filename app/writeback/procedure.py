@@ -252,7 +252,7 @@ def judged(
     """
     machine, hosted = site.machine, site.controller.hosted
     proposal = propose(machine, fit, held.values, hosted=hosted)
-    if all(change.new == change.old for change in proposal.changes):
+    if not proposal.changes_something:
         raise GateRefused(
             "the controller holds this fit already",
             remedy="There is nothing to write; measure the machine again to see how good it is",

@@ -21,6 +21,9 @@ from calib.effects import effect_named
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 
+SAME_SIGMAS = 0.01
+"""Two values closer than this part of their uncertainty are the same value."""
+
 
 @dataclass(frozen=True)
 class Change:
@@ -49,6 +52,17 @@ class Proposal:
     """Texts of the operator's own effects among the values, by id."""
     given_up: tuple[str, ...] = ()
     """Names that are held and that the whole model does not have: they are taken out."""
+
+    @property
+    def changes_something(self) -> bool:
+        """Whether any value differs from the one held by more than rounding and fitting again do.
+
+        A run that is fitted again ends within a thousandth of an uncertainty of where it ended.
+        """
+        return bool(self.given_up) or any(
+            change.new != change.old and not abs(change.in_sigmas) < SAME_SIGMAS
+            for change in self.changes
+        )
 
     @property
     def values(self) -> dict[str, float]:

@@ -49,6 +49,12 @@ def tolerance_margin(machine: Machine) -> Margin:
     )
 
 
+def stroke_margin(machine: Machine, more_mm: float) -> Margin:
+    """The room of :func:`tolerance_margin`, and ``more_mm`` at the ends of every linear stroke."""
+    strokes = np.array([actuator.unit == "mm" for actuator in machine.actuators])
+    return tolerance_margin(machine).widened(more_mm * strokes)
+
+
 def _changes(machine: Machine, poses: PoseSet, end: float) -> tuple[Array, Array, Array]:
     """Changes (m, P, N) of q by the controller's reference, by the drawing's, and of the joints."""
     count, free = poses.count, len(machine.parameters)

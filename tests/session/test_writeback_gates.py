@@ -44,6 +44,13 @@ def failed(fit: SavedFit, gates: Gates = GATES) -> list[str]:
     return [gate.gate for gate in checked if not gate.passed]
 
 
+def test_a_fit_that_is_held_but_for_rounding_changes_nothing() -> None:
+    fit = made(leg1__L0=NOMINAL["leg1.L0"] + 1e-6)
+    assert not propose(MACHINE, fit, HELD).changes_something
+    assert propose(MACHINE, made(), HELD).changes_something
+    assert propose(MACHINE, made(leg3__B_x=float("nan")), HELD).changes_something
+
+
 def test_a_sane_fit_passes_every_gate() -> None:
     assert failed(made()) == []
 
