@@ -8,29 +8,51 @@ state x = (z, u), the reading y = H x + w and the state's covariance P,
 
 and log det C is the sum of log det S (Harvey 1989, 3.4). The cost is linear in the readings.
 Readings that share nothing but their visit are filtered visit by visit, all visits at once.
+
+What hangs on how the readings were taken alone is laid out once for all sizes of the noise; of a
+step only the covariance (for the gains) and the state (for the readings) are carried on one by one,
+everything else is done for all steps together.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from calib.arrays import Array, BoolArray, IntArray
 from calib.noise.component import Noise, Taking
 
-CHUNK = 1024
-"""Columns that are filtered at once."""
+ROOM = 250_000
+"""Numbers that the states of all steps may hold while columns are filtered."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Step:
-    """One step of B filters at once: the reading of each, and what is done with it."""
+class _Layout:
+    """B sequences of readings, T steps long, with an n-fold state (n may be 3: no visits).
+
+    ``reading`` (T, B), ``there`` (T, B): which, and whether there is one; ``new`` (T, B): whether a
+    visit begins; ``seen`` (T, B, 3, n): H, nought where there is no reading.
+    """
 
     reading: IntArray
     there: BoolArray
-    fade: Array
+    new: BoolArray
     seen: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Filters:
+    """Gains and spreads of all steps.
+
+    ``carry`` (T, B, n, n) and ``take`` (T, B, n, 3): the state predicted for the next step from the
+    one predicted for this and from the reading; ``white`` (T, B, 3, 3): S^-1/2; ``spread``
+    (T, B, 3): the diagonal of S^1/2.
+    """
+
+    carry: Array
+    take: Array
     white: Array
-    gain: Array
+    spread: Array
 
 
 class Whitening:
@@ -46,7 +68,7 @@ class Whitening:
         self._count = taking.run.size
         self._noise = noise
         self._plain = noise.tau_s <= 0.0 and noise.visit <= 0.0
-        self._steps: list[_Step] = []
+        self._layout: _Layout | None = None
         self._chain: tuple[IntArray, Array] | None = None
         if self._plain:
             self.log_det = 2.0 * float(taking.held().sum()) * float(np.log(noise.scale))
@@ -57,7 +79,13 @@ class Whitening:
             held = taking.held()[taking.order]
             self.log_det = 2.0 * float(held @ np.log(noise.scale * left))
         else:
-            self.log_det = self._prepare(taking)
+            layout = _laid_out(taking, noise.tau_s > 0.0, noise.visit > 0.0)
+            self._layout = layout
+            self._filters = _filters(taking, layout, noise)
+            logs = np.log(self._filters.spread[layout.there])
+            if taking.live is not None:
+                logs = logs * taking.live[:, layout.reading[layout.there]].T
+            self.log_det = 2.0 * float(np.sum(logs))
 
     def apply(self, columns: Array) -> Array:
         """Columns (..., 3, A) of whitened components, made white; each stays in its place."""
@@ -71,58 +99,90 @@ class Whitening:
             left = self._noise.scale * np.sqrt(1.0 - rho**2)
             out[:, :, order] = (flat[:, :, order] - rho * before) / left
             return out.reshape(columns.shape)
-        parts = [self._filtered(flat[k : k + CHUNK]) for k in range(0, flat.shape[0], CHUNK)]
+        assert self._layout is not None
+        steps, batch, _, size = self._layout.seen.shape
+        chunk = max(1, ROOM // (steps * batch * size))
+        parts = [
+            self._filtered(self._layout, flat[k : k + chunk])
+            for k in range(0, flat.shape[0], chunk)
+        ]
         return np.concatenate(parts).reshape(columns.shape) if parts else columns
 
-    def _filtered(self, flat: Array) -> Array:
+    def _filtered(self, layout: _Layout, flat: Array) -> Array:
         """Innovations of columns (k, 3, A)."""
-        readings = np.ascontiguousarray(np.moveaxis(flat, 0, -1).swapaxes(0, 1))
-        out = np.zeros_like(readings)
-        batch, size = self._steps[0].gain.shape[:2]
-        state = np.zeros((batch, size, flat.shape[0]))
-        for step in self._steps:
-            state *= step.fade
-            off = readings[step.reading] - step.seen @ state
-            state += step.gain @ off
-            out[step.reading[step.there]] = (step.white @ off)[step.there]
+        rows = np.ascontiguousarray(np.moveaxis(flat, 0, -1).swapaxes(0, 1))
+        readings = rows[layout.reading]
+        states = np.zeros((*layout.seen.shape[:2], layout.seen.shape[3], flat.shape[0]))
+        fed = self._filters.take @ readings
+        for step in range(states.shape[0] - 1):
+            np.matmul(self._filters.carry[step], states[step], out=states[step + 1])
+            states[step + 1] += fed[step]
+        white = self._filters.white @ (readings - layout.seen @ states)
+        out = np.zeros_like(rows)
+        out[layout.reading[layout.there]] = white[layout.there]
         return np.asarray(np.moveaxis(out.swapaxes(0, 1), -1, 0))
 
-    def _prepare(self, taking: Taking) -> float:
-        """Run the covariances through all filters; log det of the whole covariance."""
-        noise, order = self._noise, taking.order
-        ties = noise.tau_s > 0.0
-        first = 3 if ties else 0
-        size = first + (taking.motions.shape[0] if noise.visit > 0.0 else 0)
-        sequences = _sequences(taking, order, ties)
-        rho = np.zeros(self._count)
-        rho[order] = np.exp(-taking.gaps(noise.by_row) / noise.tau_s) if ties else 0.0
-        variance, correlated = noise.scale**2, noise.share if ties else 0.0
-        covariance = np.zeros((len(sequences), size, size))
-        before = np.full(len(sequences), -2)
-        log_det = 0.0
-        for place in range(max(len(one) for one in sequences)):
-            there = np.array([place < len(one) for one in sequences])
-            reading = np.array([one[min(place, len(one) - 1)] for one in sequences], dtype=np.intp)
-            fade = np.ones((len(sequences), size))
-            fade[:, :first] = rho[reading][:, None]
-            visit = taking.visit[reading]
-            new = (visit != before) & (visit >= 0)
-            fade[:, first:][new] = 0.0
-            before = np.where(visit >= 0, visit, before)
-            covariance = covariance * fade[:, :, None] * fade[:, None, :]
-            fresh = np.zeros((len(sequences), size))
-            fresh[:, :first] = (correlated * variance * (1.0 - rho[reading] ** 2))[:, None]
-            fresh[:, first:][new] = noise.visit**2
-            covariance[:, np.arange(size), np.arange(size)] += fresh
-            step, spread, covariance = _update(
-                taking, reading, there, fade, covariance, (1.0 - correlated) * variance, first
-            )
-            self._steps.append(step)
-            logs = np.log(spread[there])
-            if taking.live is not None:
-                logs = logs * taking.live[:, reading[there]].T
-            log_det += 2.0 * float(np.sum(logs))
-        return log_det
+
+@lru_cache(maxsize=8)
+def _laid_out(taking: Taking, ties: bool, visits: bool) -> _Layout:
+    """The sequences of readings, side by side."""
+    sequences = _sequences(taking, taking.order, ties)
+    length = np.array([one.size for one in sequences])
+    place = np.arange(length.max())[:, None]
+    there = place < length
+    reading = np.zeros(there.shape, dtype=np.intp)
+    for k, one in enumerate(sequences):
+        reading[:, k] = one[np.minimum(place[:, 0], one.size - 1)]
+    visit = np.where(there, taking.visit[reading], -1)
+    before = np.full(visit.shape, -2)
+    for step in range(1, visit.shape[0]):
+        before[step] = np.where(visit[step - 1] >= 0, visit[step - 1], before[step - 1])
+    first = 3 if ties else 0
+    size = first + (taking.motions.shape[0] if visits else 0)
+    seen = np.zeros((*there.shape, 3, size))
+    seen[..., :first] = np.eye(3)[:, :first]
+    if visits:
+        motions = taking.motions.transpose(2, 1, 0)[reading]
+        seen[..., first:] = motions * (taking.visit[reading] >= 0)[..., None, None]
+    seen *= there[..., None, None]
+    return _Layout(reading, there, (visit >= 0) & (visit != before), seen)
+
+
+def _filters(taking: Taking, layout: _Layout, noise: Noise) -> _Filters:
+    """Run the covariances through all sequences."""
+    seen, ties = layout.seen, noise.tau_s > 0.0
+    steps, batch, _, size = seen.shape
+    first = 3 if ties else 0
+    variance, correlated = noise.scale**2, noise.share if ties else 0.0
+    fade = np.ones((steps, batch, size))
+    fresh = np.zeros((steps, batch, size))
+    if ties:
+        rho = np.zeros(taking.run.size)
+        rho[taking.order] = np.exp(-taking.gaps(noise.by_row) / noise.tau_s)
+        fade[..., :first] = rho[layout.reading][..., None]
+        fresh[..., :first] = correlated * variance * (1.0 - fade[..., :first] ** 2)
+    fade[..., first:][layout.new] = 0.0
+    fresh[..., first:][layout.new] = noise.visit**2
+    fades = fade[..., :, None] * fade[..., None, :]
+    added = fresh[..., None] * np.eye(size)
+    white = np.where(layout.there, (1.0 - correlated) * variance, 1.0)[..., None, None] * np.eye(3)
+    back = np.ascontiguousarray(seen.swapaxes(-1, -2))
+    total = np.empty((steps, batch, 3, 3))
+    gain = np.empty((steps, batch, size, 3))
+    covariance = np.zeros((batch, size, size))
+    for step in range(steps):
+        covariance *= fades[step]
+        covariance += added[step]
+        reach = covariance @ back[step]
+        total[step] = seen[step] @ reach + white[step]
+        gain[step] = reach @ np.linalg.inv(total[step])
+        covariance -= gain[step] @ reach.swapaxes(1, 2)
+    factor = np.linalg.cholesky(total)
+    carry = np.eye(size) - gain @ seen
+    carry[:-1] *= fade[1:, :, :, None]
+    gain[:-1] *= fade[1:, :, :, None]
+    spread = np.diagonal(factor, axis1=-2, axis2=-1)
+    return _Filters(carry, gain, np.linalg.inv(factor), spread)
 
 
 def _sequences(taking: Taking, order: IntArray, ties: bool) -> list[IntArray]:
@@ -135,32 +195,3 @@ def _sequences(taking: Taking, order: IntArray, ties: bool) -> list[IntArray]:
     ranked = ranked[own[ranked] >= 0]
     cuts = np.flatnonzero(np.diff(own[ranked])) + 1
     return [*alone, *(order[part] for part in np.split(ranked, cuts) if part.size)]
-
-
-def _update(
-    taking: Taking,
-    reading: IntArray,
-    there: BoolArray,
-    fade: Array,
-    covariance: Array,
-    white: float,
-    first: int,
-) -> tuple[_Step, Array, Array]:
-    """One reading of every filter: the step, the diagonal of S^1/2 (B, 3), P after it."""
-    count, size = fade.shape
-    seen = np.zeros((count, 3, size))
-    seen[:, :, :first] = np.eye(3)[:, :first]
-    if size > first:
-        held = taking.visit[reading] >= 0
-        seen[:, :, first:] = np.moveaxis(taking.motions[:, :, reading], -1, 0).swapaxes(1, 2)
-        seen[:, :, first:] *= held[:, None, None]
-    seen = seen * there[:, None, None]
-    reach = covariance @ seen.swapaxes(1, 2)
-    total = seen @ reach
-    total[:, np.arange(3), np.arange(3)] += np.where(there, white, 1.0)[:, None]
-    factor = np.linalg.cholesky(total)
-    inverse = np.linalg.inv(factor)
-    gain = reach @ (inverse.swapaxes(1, 2) @ inverse)
-    after = covariance - gain @ reach.swapaxes(1, 2)
-    step = _Step(reading, there, fade[:, :, None], seen, inverse, gain)
-    return step, np.diagonal(factor, axis1=1, axis2=2), after

@@ -5,6 +5,7 @@ import io
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app.cli import run as pkmcal
@@ -50,20 +51,23 @@ def only(keep):
     return lambda rows: [row for row in rows if keep(row)]
 
 
-def read_anew(value, number):
+def read_anew(value, noise):
     """A point read once more: never the same to the last digit."""
-    return f"{float(value) + 0.004 * (-1) ** number:.5f}"
+    return f"{float(value) + noise.normal(0.0, 0.003):.5f}"
 
 
 def in_nest_4(poses):
     """The SMR sat in nest 4 where the label says 5."""
 
     def change(rows):
+        noise = np.random.default_rng(5)
         four = {row["pose"]: row for row in rows if row["nest"] == "4"}
         wrong = [row["nest"] == "5" and (poses is None or row["pose"] in poses) for row in rows]
         return [
-            row | {axis: read_anew(four[row["pose"]][axis], k) for axis in "xyz"} if bad else row
-            for k, (row, bad) in enumerate(zip(rows, wrong, strict=True))
+            row | {axis: read_anew(four[row["pose"]][axis], noise) for axis in "xyz"}
+            if bad
+            else row
+            for row, bad in zip(rows, wrong, strict=True)
         ]
 
     return change

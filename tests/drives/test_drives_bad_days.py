@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import can
 import pytest
-from conftest import FAR, HOME, Bare
+from bare_lab import FAR, HOME, SHORT, Bare
 
 from drivers.errors import DeviceFault, DriveFault, HeartbeatLost, Refused
 from mocks.canopen.bare_drive import LATE_MODE_S, LATE_RESET_S
@@ -120,7 +120,7 @@ async def test_nothing_that_was_under_way_undoes_a_stop(bare):
 
 
 async def test_one_that_falls_silent_stops_all(bare):
-    motors = await bare.ready(speed=(4.0,) * 6)
+    motors = await bare.ready(speed=(4.0,) * 6, silence_s=SHORT)
     await motors.move_actuators(FAR)
     bare.world.faults.inject("heartbeat-silent:5")
     with pytest.raises(HeartbeatLost, match=r"q5 \(node 5\)"):
@@ -150,7 +150,7 @@ async def test_a_motor_that_runs_the_wrong_way_is_stopped_at_once(bare):
 )
 @pytest.mark.parametrize("mode", ["profile", "cyclic"])
 async def test_without_the_pc_the_drives_stop_by_themselves(bare, on_silence, state, mode):
-    motors = await bare.ready(on_silence=on_silence, speed=(2.0,) * 6, mode=mode)
+    motors = await bare.ready(on_silence=on_silence, speed=(2.0,) * 6, mode=mode, silence_s=SHORT)
     await motors.move_actuators(FAR)
     await until(lambda: bare.moving)
     motors._bus.link._end.set()  # our heartbeat ends, as if this process were dead

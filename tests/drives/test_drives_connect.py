@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from conftest import HOME
+from bare_lab import HOME, SHORT
 
 from drivers.errors import ConnectFailed, DeviceError, Refused
 from mocks.canopen.bare_eds import SCREW, bare_eds_path
@@ -27,7 +27,7 @@ async def test_another_drive_than_before_is_refused(bare):
 async def test_a_drive_that_is_off(bare):
     bare.world.faults.inject("heartbeat-silent:4")
     with pytest.raises(ConnectFailed, match=r"drive q4 \(node 4\) does not.*switched on"):
-        await bare.connect()
+        await bare.connect(silence_s=SHORT)
 
 
 async def test_a_wrong_node_number(bare):
@@ -81,7 +81,7 @@ async def test_units_that_nobody_says(bare):
 
 
 async def test_what_a_drive_does_at_a_stop_and_without_the_pc_is_written(bare):
-    await bare.connect(quick_stop=6, on_silence=3)
+    await bare.connect(quick_stop=6, on_silence=3, silence_s=0.6)
     for number in range(1, 7):
         drive = bare.drive(number)
         assert (drive.value(0x605A), drive.value(0x6007)) == (6, 3)

@@ -118,7 +118,7 @@ async def test_named_added_and_the_error_of_the_machine_falls(tmp_path: Path) ->
         done = await applied(here, whole, tmp_path)
         after = await true_misses(here)
         assert not done.proposal.left_out
-        again = fitted(await measured(here, tmp_path, 10), EFFECTS, tmp_path)
+        again = fitted(await measured(here, tmp_path, 20), EFFECTS, tmp_path)
         undone = Station(here.site())
         await undone.connect()
         try:

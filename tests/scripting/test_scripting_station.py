@@ -111,15 +111,6 @@ def test_script_and_verb_verify_alike(
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("how", ["stop", "interrupt"])
 def test_a_job_that_was_stopped_is_gone_on_with(how: str, site: Path, tmp_path: Path) -> None:
-    # A suite that was begun in the background has interrupts ignored.
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        _stopped_and_gone_on_with(how, site, tmp_path)
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-def _stopped_and_gone_on_with(how: str, site: Path, tmp_path: Path) -> None:
     reading, asked, heard = threading.Event(), threading.Event(), []
 
     def watch(event: ev.Event) -> None:
