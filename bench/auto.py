@@ -1,40 +1,51 @@
 """Deciding by itself against a fixed plan: readings spent, targets held, causes named.
 
-    python -m bench auto [--worlds 100] [--target-um 8] [--seed 1] [--workers 2]
+    python -m bench auto [--worlds 100] [--target-um 8 3] [--seed 1] [--out FILE] [--minutes 5]
 
 Worlds are simulated by the mock's own physics: 0 to 3 hidden effects of the catalogue, at two
-sqrt(3) sigma RMS each. In each the autopilot works until it stops; the fixed plan measures 40
-poses once and discovers. The true error is that of noise-free readings at fresh poses against
-the model, which neither of them sees.
+sqrt(3) sigma RMS each; every other four worlds have noise that is correlated from reading to
+reading (0.3). In each the autopilot works until it stops, once for every target; the fixed plan
+measures 40 poses once and discovers. The true error is that of noise-free readings at fresh poses
+against the model, which none of them sees.
+
+Every world is a line of FILE: the same command goes on where the last one was. No world is begun
+after so many minutes.
 """
 
 import argparse
 import asyncio
+import json
 import os
 import tempfile
+import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from scipy.stats import beta, binom
 
 from app.auto.autopilot import Autopilot, Seen
-from app.auto.findings import fresh_poses
+from app.auto.findings import Findings, fresh_poses, look
+from app.auto.known import HOPELESS
 from app.auto.policy import Limits
 from app.files.machines import load_machine
-from app.files.pose_table import Pose, poses_text
-from app.jobs.discovering import discover
+from app.files.pose_table import Pose
 from app.jobs.posing import choose_poses
 from app.jobs.predicting import predict
-from app.jobs.simulating import simulate
-from bench._blind_cases import Case, build, drawn_on
+from bench._blind_cases import NEXT_TO_NONE_MM, SIGMA_MM, Case, build, drawn_on
+from bench._blind_noise import noisy
+from mocks.hidden.table import Hidden
+from mocks.simulate.files import write
+from mocks.simulate.plan import Profile, RunPlan
+from mocks.simulate.run import simulate
 
 MACHINE, FIXED, SIZE = "hexapod", 40, 2.0
 MINUTES_A_POSE = 2.0
-QUIET_UM = 0.05
+CORRELATED = "ar:0.3"
+QUIET_MM = 5e-5
 """Noise of the readings that tell the true error."""
 OF_ONE_RUN = ("frame-shift", "actuator-step", "warm-up")
 """Events of one run: a world of several runs cannot hold them alike."""
@@ -42,51 +53,63 @@ OF_ONE_RUN = ("frame-shift", "actuator-step", "warm-up")
 
 @dataclass(frozen=True)
 class World:
-    """A machine with its hidden effects, and the seed of everything."""
+    """A machine with its hidden effects, how its readings err, and the seed of everything."""
 
     seed: int
     effects: tuple[str, ...]
+    noise: str
 
 
 @dataclass(frozen=True)
 class Came:
-    """What one way of measuring came to in one world."""
+    """What one way of measuring came to in one world.
+
+    ``readings`` for the fit, ``proof`` those of verifications; ``open``: pairs that are in
+    question at the end; ``reached``: what the autopilot said.
+    """
 
     readings: int
+    proof: int
     true_um: float
     named: bool
     false_names: int
-    stopped: str = ""
+    open: int
+    reached: bool | None = None
 
 
 class SimulatedLaboratory:
     """Runs of one world; the frame is another one in each, as after a day."""
 
     def __init__(self, world: World, hidden: Mapping[str, float], folder: Path) -> None:
-        self.world, self.hidden, self.folder = world, hidden, folder
+        folder.mkdir()
+        self.world, self.hidden, self.folder = world, Hidden(dict(hidden)), folder
         self.runs = 0
+        self.parameters: Mapping[str, float] | None = None
         self.model: Path | None = None
 
-    def run(self, poses: Mapping[str, Pose], noise_um: float = 5.0) -> str:
+    def run(self, poses: Mapping[str, Pose], noise_mm: float = SIGMA_MM) -> str:
         """Simulate a run at poses."""
         self.runs += 1
-        table, run = self.folder / f"{self.runs}.csv", self.folder / f"run{self.runs}"
-        table.write_text(poses_text(poses), encoding="utf-8")
-        truth = self.folder / "truth.json"
-        simulate(
-            MACHINE,
-            run,
+        plan = RunPlan(
+            machine=MACHINE,
             # Another room and other noise in each run, the same machine.
             seed=self.world.seed + 1_000_000 * self.runs,
-            truth=truth if self.runs == 1 else self.folder / f"truth{self.runs}.json",
-            parameters=truth if self.runs > 1 else None,
-            poses=table,
-            noise_um=noise_um,
-            effects=dict(self.hidden),
-            payload=(0.0, 12.0),
+            poses=np.array(list(poses.values())),
+            noise_mm=noise_mm,
+            hidden=self.hidden,
+            parameters=self.parameters,
+            profile=Profile(rise_K=6.0, payload_kg=(0.0, 12.0)),
+            prior="normal",
             delays=True,
         )
-        return str(run)
+        made = simulate(plan)
+        self.parameters = made.parameters
+        if self.world.noise and noise_mm == SIGMA_MM:
+            bare = simulate(replace(plan, parameters=made.parameters, noise_mm=NEXT_TO_NONE_MM))
+            made = replace(made, xyz=noisy(bare, self.world.noise, SIGMA_MM, plan.seed))
+        out = self.folder / f"run{self.runs}"
+        write(made, out, self.folder / f"truth{self.runs}.json")
+        return str(out)
 
     async def choose(self, count: int, seed: int) -> Mapping[str, Pose]:
         return choose_poses(MACHINE, count, candidates=300, seed=seed).by_label()
@@ -107,107 +130,164 @@ class SimulatedLaboratory:
         assert seen.rms_um is not None
         assert seen.noise_um is not None
         own = float(np.sqrt(max(seen.rms_um**2 - seen.noise_um**2, 0.0)))
-        return Seen(own, float("nan"), MINUTES_A_POSE * len(poses))
+        return Seen(own, own, MINUTES_A_POSE * len(poses))
 
     def true_um(self, model: Path) -> float:
         """RMS of what the model does not know of noise-free readings at fresh poses."""
-        run = self.run(fresh_poses(load_machine(MACHINE)), QUIET_UM)
+        run = self.run(fresh_poses(load_machine(MACHINE)), QUIET_MM)
         return float(predict(model, run, frame=True).rms_um or np.nan)
 
 
 def draw(count: int, seed: int) -> list[World]:
-    """Worlds with 0 to 3 hidden effects in turn."""
+    """Worlds with 0 to 3 hidden effects in turn, four with white and four with other noise."""
     rng = np.random.default_rng(seed)
     names = [name for name in drawn_on(MACHINE, unknown=False) if name not in OF_ONE_RUN]
     return [
-        World(seed * 10_000 + k, tuple(map(str, rng.choice(names, k % 4, replace=False))))
+        World(
+            seed * 10_000 + k,
+            tuple(map(str, rng.choice(names, k % 4, replace=False))),
+            CORRELATED if k // 4 % 2 else "",
+        )
         for k in range(count)
     ]
 
 
-def both(job: tuple[World, float]) -> tuple[Came, Came]:
-    """The autopilot and the fixed plan in one world."""
-    world, target_um = job
+def tried(world: World, targets_um: Sequence[float]) -> dict[str, Came]:
+    """The autopilot for each target, and the fixed plan, in one world."""
     case = Case(world.seed, world.effects, (SIZE,) * len(world.effects), "", machine=MACHINE)
     _, hidden = build(case, 40)
-    with tempfile.TemporaryDirectory() as folder:
-        return _auto(world, hidden, Path(folder) / "a", target_um), _fixed(
-            world, hidden, Path(folder) / "b"
-        )
+    with tempfile.TemporaryDirectory() as made:
+        folder = Path(made)
+        came = {
+            f"{target:g}": _auto(SimulatedLaboratory(world, hidden, folder / f"{target:g}"), target)
+            for target in targets_um
+        }
+        return {**came, "fixed": _fixed(SimulatedLaboratory(world, hidden, folder / "fixed"))}
 
 
-def _auto(world: World, hidden: Mapping[str, float], folder: Path, target_um: float) -> Came:
-    folder.mkdir()
-    laboratory = SimulatedLaboratory(world, hidden, folder)
-    pilot = Autopilot(folder, laboratory, Limits(target_um, minutes=6 * 60.0))
+def _auto(laboratory: SimulatedLaboratory, target_um: float) -> Came:
+    pilot = Autopilot(laboratory.folder, laboratory, Limits(target_um, minutes=6 * 60.0))
     last = asyncio.run(pilot.run())
-    found = pilot.journal.of("found")[-1]
-    poses = sum(int(line.get("poses", 0)) for line in pilot.journal.of("done"))
-    return _judged(
-        laboratory, Path(found["model"]), world, tuple(found["effects"]), poses, str(last.reached)
-    )
+    done = pilot.journal.of("done")
+    found = Findings.from_json(pilot.journal.of("found")[-1])
+    left = {tuple(line["pair"]) for line in done if HOPELESS in line}
+    return replace(
+        _judged(laboratory, found, sum(int(line.get("poses", 0)) for line in done)),
+        proof=3 * len(fresh_poses(load_machine(MACHINE)))
+        * sum("verified_um" in line for line in done),
+        open=len(left & set(found.ambiguous)),
+        reached=last.reached,
+    )  # fmt: skip
 
 
-def _fixed(world: World, hidden: Mapping[str, float], folder: Path) -> Came:
-    folder.mkdir()
-    laboratory = SimulatedLaboratory(world, hidden, folder)
+def _fixed(laboratory: SimulatedLaboratory) -> Came:
     run = laboratory.run(asyncio.run(laboratory.choose(FIXED, 1)))
-    report = discover(run)
-    model = folder / "model.toml"
-    report.save(model)
-    return _judged(laboratory, model, world, report.effects, FIXED)
+    return _judged(laboratory, look((run,), laboratory.folder / "model.toml"), FIXED)
 
 
-def _judged(
-    laboratory: SimulatedLaboratory, model: Path, world: World, found: Sequence[str], poses: int,
-    stopped: str = "",
-) -> Came:  # fmt: skip
-    false = len(set(found) - set(world.effects))
+def _judged(laboratory: SimulatedLaboratory, found: Findings, poses: int) -> Came:
+    hidden, named = set(laboratory.world.effects), set(found.effects)
     return Came(
-        3 * poses, laboratory.true_um(model), set(world.effects) <= set(found), false, stopped
-    )
+        3 * poses, 0, laboratory.true_um(Path(found.model)), hidden <= named, len(named - hidden),
+        len(found.ambiguous),
+    )  # fmt: skip
+
+
+def read(file: Path) -> dict[int, dict[str, Came]]:
+    """Worlds that were tried already, by their seeds."""
+    if not file.exists():
+        return {}
+    lines = map(json.loads, file.read_text(encoding="utf-8").splitlines())
+    return {
+        line["seed"]: {way: Came(**came) for way, came in line["came"].items()} for line in lines
+    }
+
+
+def table(came: Sequence[Mapping[str, Came]], targets_um: Sequence[float]) -> list[str]:
+    """Rows over all worlds; in brackets the 95 % interval."""
+    ways = [*(f"{target:g}" for target in targets_um), "fixed"]
+    heads = [*(f"decides by itself, {target:g} um" for target in targets_um), f"{FIXED} poses"]
+    lines = ["| | " + " | ".join(heads) + " |", "|---" * (1 + len(ways)) + "|"]
+    rows: dict[str, Callable[[Sequence[Came]], str]] = {
+        "readings for the fit, median": lambda all_: _median([c.readings for c in all_]),
+        "readings to prove it, median": lambda all_: _median([c.proof for c in all_]),
+        "true error, um, median": lambda all_: _median([c.true_um for c in all_]),
+        "all hidden effects named": lambda all_: _share([c.named for c in all_]),
+        "nothing else named": lambda all_: _share([not c.false_names for c in all_]),
+        "a pair is left in question": lambda all_: _share([c.open > 0 for c in all_]),
+        "says that the target holds": lambda all_: _share([c.reached for c in all_]),
+    }
+    for says, of in rows.items():
+        cells = [of([one[way] for one in came]) for way in ways]
+        lines.append(f"| {says} | " + " | ".join(cells) + " |")
+    for target in targets_um:
+        cells = [_share([one[way].true_um <= target for one in came]) for way in ways]
+        lines.append(f"| true error within {target:g} um | " + " | ".join(cells) + " |")
+    return lines
+
+
+def _median(values: Sequence[float]) -> str:
+    """The median, and order statistics that hold it with 95 %, whatever the distribution."""
+    ordered, count = sorted(values), len(values)
+    low = max(int(binom.ppf(0.025, count, 0.5)), 1)
+    return f"{np.median(ordered):.3g} ({ordered[low - 1]:.3g}, {ordered[count - low]:.3g})"
+
+
+def _share(true: Sequence[bool | None]) -> str:
+    """A share with its interval by Clopper and Pearson; a dash where nobody was asked."""
+    if None in true:
+        return "-"
+    k, n = sum(map(bool, true)), len(true)
+    low = beta.ppf(0.025, k, n - k + 1) if k else 0.0
+    high = beta.ppf(0.975, k + 1, n - k) if k < n else 1.0
+    return f"{100 * k / n:.0f} % ({100 * low:.0f}, {100 * high:.0f})"
+
+
+def by_kind(worlds: Sequence[World], done: Mapping[int, Mapping[str, Came]]) -> list[str]:
+    """Names by the number of hidden effects and by the noise."""
+    ways = list(next(iter(done.values())))
+    lines = [
+        "| hidden, noise | worlds | " + " | ".join(ways) + " |",
+        "|---" * (2 + len(ways)) + "|",
+    ]
+    for noise in ("", CORRELATED):
+        for count in range(4):
+            here = [
+                done[w.seed] for w in worlds
+                if w.seed in done and (len(w.effects), w.noise) == (count, noise)
+            ]  # fmt: skip
+            right = (
+                f"{sum(one[way].named and not one[way].false_names for one in here)}"
+                for way in ways
+            )
+            kind = f"{count}, {noise or 'white'}"
+            lines.append(f"| {kind} | {len(here)} | " + " | ".join(right) + " |")
+    return lines
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--worlds", type=int, default=100)
-    parser.add_argument("--target-um", type=float, default=8.0)
+    parser.add_argument("--target-um", type=float, nargs="+", default=[8.0, 3.0])
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--out", type=Path)
+    parser.add_argument("--minutes", type=float, default=np.inf)
     options = parser.parse_args()
-    from bench import auto as here  # importable by name in the other processes
-
-    jobs = [(world, options.target_um) for world in here.draw(options.worlds, options.seed)]
-    with ProcessPoolExecutor(options.workers) as pool:
-        pairs = list(pool.map(here.both, jobs))
-    print("| | decides by itself | 40 poses at once |\n|---|---|---|")
-    for says, of in (
-        ("readings, median (10 %, 90 %)", lambda came: _spread([c.readings for c in came])),
-        ("true error um, median (10 %, 90 %)", lambda came: _spread([c.true_um for c in came])),
-        (
-            f"true error within {options.target_um:g} um",
-            lambda came: _share([c.true_um <= options.target_um for c in came]),
-        ),
-        ("all hidden effects named", lambda came: _share([c.named for c in came])),
-        ("names that were not hidden, a world", lambda came: f"{_mean_false(came):.2f}"),
-    ):
-        print(f"| {says} | {of([a for a, _ in pairs])} | {of([b for _, b in pairs])} |")
-    ends = [a.stopped for a, _ in pairs]
-    print(f"\nOf {len(pairs)} worlds it said reached in {ends.count('True')}.")
-
-
-def _spread(values: Sequence[float]) -> str:
-    low, middle, high = np.quantile(values, [0.1, 0.5, 0.9])
-    return f"{middle:.3g} ({low:.3g}, {high:.3g})"
-
-
-def _share(true: Sequence[bool]) -> str:
-    p = float(np.mean(true))
-    return f"{100 * p:.0f} +- {100 * np.sqrt(max(p * (1 - p), 1e-12) / len(true)):.0f} %"
-
-
-def _mean_false(came: Sequence[Came]) -> float:
-    return float(np.mean([c.false_names for c in came]))
+    worlds = draw(options.worlds, options.seed)
+    done = read(options.out) if options.out else {}
+    began = time.monotonic()
+    for world in worlds:
+        if world.seed in done or time.monotonic() - began > 60.0 * options.minutes:
+            continue
+        done[world.seed] = tried(world, options.target_um)
+        if options.out:
+            came = {way: asdict(one) for way, one in done[world.seed].items()}
+            with options.out.open("a", encoding="utf-8") as file:
+                file.write(json.dumps({"seed": world.seed, "came": came}) + "\n")
+    here = [done[world.seed] for world in worlds if world.seed in done]
+    print("\n".join(table(here, options.target_um)))
+    print(f"\n{len(here)} of {len(worlds)} worlds; named rightly and nothing else:\n")
+    print("\n".join(by_kind(worlds, done)))
 
 
 if __name__ == "__main__":

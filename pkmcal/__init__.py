@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from app.jobs.applying import ApplyReport as ApplyReport
     from app.jobs.applying import SetsReport as SetsReport
     from app.jobs.applying import UndoReport as UndoReport
+    from app.jobs.automatic import AutoReport as AutoReport
     from app.jobs.chosen_runs import load_runs as load_runs
     from app.jobs.comparing import CompareReport as CompareReport
     from app.jobs.comparing import compare as compare
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
     from app.jobs.discovering import DiscoveryReport as DiscoveryReport
     from app.jobs.discovering import diagnose as diagnose
     from app.jobs.discovering import discover as discover
+    from app.jobs.exporting import export as export
     from app.jobs.fitting import FitReport as FitReport
     from app.jobs.fitting import fit as fit
     from app.jobs.following_up import FollowUpReport as FollowUpReport
@@ -56,6 +58,12 @@ if TYPE_CHECKING:
     from app.jobs.importing import import_run as import_run
     from app.jobs.kinematics import KinematicsReport as KinematicsReport
     from app.jobs.kinematics import kinematics as kinematics
+    from app.jobs.listing import LogReport as LogReport
+    from app.jobs.listing import SessionsReport as SessionsReport
+    from app.jobs.listing import list_sessions as list_sessions
+    from app.jobs.listing import session_log as session_log
+    from app.jobs.looking_back import HistoryReport as HistoryReport
+    from app.jobs.looking_back import history_of as history_of
     from app.jobs.measuring import SessionReport as SessionReport
     from app.jobs.posing import GridReport as GridReport
     from app.jobs.posing import PosesReport as PosesReport
@@ -76,6 +84,7 @@ _HOMES = {
     "AcceptReport": "app.jobs.applying",
     "ApplyReport": "app.jobs.applying",
     "AsyncStation": "pkmcal.async_station",
+    "AutoReport": "app.jobs.automatic",
     "BadInput": "calib.errors",
     "CompareReport": "app.jobs.comparing",
     "CompletionReport": "app.jobs.completing",
@@ -88,11 +97,14 @@ _HOMES = {
     "GateRefused": "app.errors",
     "GridReport": "app.jobs.posing",
     "GuessReport": "app.jobs.guessing",
+    "HistoryReport": "app.jobs.looking_back",
     "ImportReport": "app.jobs.importing",
     "KinematicsReport": "app.jobs.kinematics",
+    "LogReport": "app.jobs.listing",
     "PosesReport": "app.jobs.posing",
     "PredictReport": "app.jobs.predicting",
     "SessionReport": "app.jobs.measuring",
+    "SessionsReport": "app.jobs.listing",
     "SetsReport": "app.jobs.applying",
     "SimulationReport": "app.jobs.simulating",
     "Station": "pkmcal.station",
@@ -106,14 +118,18 @@ _HOMES = {
     "design": "app.jobs.following_up",
     "diagnose": "app.jobs.discovering",
     "discover": "app.jobs.discovering",
+    "export": "app.jobs.exporting",
     "fit": "app.jobs.fitting",
     "guess_map": "app.jobs.guessing",
+    "history_of": "app.jobs.looking_back",
     "import_run": "app.jobs.importing",
     "kinematics": "app.jobs.kinematics",
+    "list_sessions": "app.jobs.listing",
     "load_machine": "app.files.machines",
     "load_runs": "app.jobs.chosen_runs",
     "mock_station": "pkmcal.mock",
     "predict": "app.jobs.predicting",
+    "session_log": "app.jobs.listing",
     "simulate": "app.jobs.simulating",
     "verification_grid": "app.jobs.posing",
 }
@@ -123,6 +139,7 @@ __all__ = [
     "AcceptReport",
     "ApplyReport",
     "AsyncStation",
+    "AutoReport",
     "BadInput",
     "CompareReport",
     "CompletionReport",
@@ -135,12 +152,15 @@ __all__ = [
     "GateRefused",
     "GridReport",
     "GuessReport",
+    "HistoryReport",
     "ImportReport",
     "KinematicsReport",
+    "LogReport",
     "NameTaken",
     "PosesReport",
     "PredictReport",
     "SessionReport",
+    "SessionsReport",
     "SetsReport",
     "SimulationReport",
     "Station",
@@ -154,14 +174,18 @@ __all__ = [
     "design",
     "diagnose",
     "discover",
+    "export",
     "fit",
     "guess_map",
+    "history_of",
     "import_run",
     "kinematics",
+    "list_sessions",
     "load_machine",
     "load_runs",
     "mock_station",
     "predict",
+    "session_log",
     "simulate",
     "verification_grid",
 ]

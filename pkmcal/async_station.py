@@ -7,6 +7,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, Self
 
+from app.auto.flight import Flight, folder_of, limits_of
+from app.auto.station import StationLaboratory
 from app.errors import GateRefused, StoppedByOperator
 from app.files.fits import read_fit
 from app.files.pose_table import Pose
@@ -21,6 +23,7 @@ from app.jobs.applying import (
     bring_back,
     known_sets,
 )
+from app.jobs.automatic import AutoReport
 from app.jobs.chosen_runs import File, at_least, path_of
 from app.jobs.measuring import SessionReport, begin_again, begin_measuring, session_report
 from app.jobs.verifying import (
@@ -78,7 +81,7 @@ class AsyncStation:
         self._connection = Connection(self.site)
         self._connection.observers.watch(self._hear)
         self._watch = watch
-        self._running: Session | WriteBack | None = None
+        self._running: Session | WriteBack | Flight | None = None
         self._busy = False
         self._fault: Exception | None = None
         self._asking: set[asyncio.Task[None]] = set()
@@ -176,6 +179,36 @@ class AsyncStation:
         )
         return verification_report((await self._run(session)).folder, earlier)
 
+    async def auto(
+        self,
+        target_um: float | None = None,
+        *,
+        hours: float | None = None,
+        first: int = 15,
+        apply: bool = True,
+        seed: int = 1,
+        out: File | None = None,
+        decide: Operator | None = None,
+        tell: Callable[[str], None] | None = None,
+    ) -> AutoReport:
+        """Decide by itself what to do next; see :meth:`Station.auto`."""
+        folder = folder_of(out)
+        limits = limits_of(folder, target_um, hours, first, apply=apply)
+        laboratory = StationLaboratory(
+            self._connection, folder / "sessions", unattended=self._operator is None
+        )
+
+        async def ask(text: str, answers: tuple[str, ...]) -> str:
+            assert decide is not None
+            return await asyncio.to_thread(decide, text, answers)
+
+        flight = Flight(
+            laboratory, folder, limits, seed, None if decide is None else ask,
+            tell or (lambda _: None),
+        )  # fmt: skip
+        async with self._job(flight):
+            return await flight.run()
+
     async def propose(self, fit: File, *, limits: Mapping[str, float] | None = None) -> ApplyReport:
         """What would be written; see :meth:`Station.propose`."""
         job = self._write_back(fit, limits, yes=False)
@@ -233,7 +266,7 @@ class AsyncStation:
         )
 
     @asynccontextmanager
-    async def _job(self, running: Session | WriteBack | None) -> AsyncIterator[None]:
+    async def _job(self, running: Session | WriteBack | Flight | None) -> AsyncIterator[None]:
         """Connect, remember what :meth:`stop` stops, and let the devices go after a fault."""
         if self._busy:
             raise GateRefused("another job is under way", remedy="Wait for it, or stop it")
@@ -270,10 +303,16 @@ class AsyncStation:
         """Ask the script, beside the event loop, and hand its answer on; a fault there stops."""
         try:
             given = await asyncio.to_thread(operator, prompt.text, prompt.choices)
-            running = self._running
-            session = running.running if isinstance(running, WriteBack) else running
+            session = _session_of(self._running)
             if session is not None:
                 session.answer_prompt(prompt.prompt, given)
         except Exception as fault:
             self._fault = fault
             await self.stop()
+
+
+def _session_of(running: Session | WriteBack | Flight | None) -> Session | None:
+    """The session that may have asked something."""
+    if isinstance(running, Flight):
+        return running.laboratory.running
+    return running.running if isinstance(running, WriteBack) else running

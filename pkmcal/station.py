@@ -10,6 +10,7 @@ from typing import Any, Self, TypeVar
 from app.files.pose_table import Pose
 from app.files.site import Site
 from app.jobs.applying import AcceptReport, ApplyReport, SetsReport, UndoReport
+from app.jobs.automatic import AutoReport
 from app.jobs.chosen_runs import File
 from app.jobs.measuring import SessionReport
 from app.jobs.verifying import VerificationReport
@@ -230,6 +231,66 @@ class Station:
         return self._wait(
             self._station.verify(poses, truth=truth, reference_every=reference_every, before=before)
         )
+
+    def auto(
+        self,
+        target_um: float | None = None,
+        *,
+        hours: float | None = None,
+        first: int = 15,
+        apply: bool = True,
+        seed: int = 1,
+        out: File | None = None,
+        decide: Operator | None = None,
+        tell: Callable[[str], None] | None = None,
+    ) -> AutoReport:
+        """Calibrate until fresh poses show the wanted accuracy, deciding what to do next.
+
+        Measure, find what is missing, measure for what cannot be told apart, write through the
+        gates, verify; see docs/auto.md. Every decision is journaled before it is carried out.
+
+        Parameters
+        ----------
+        target_um : float, optional
+            RMS position error at fresh poses that is wanted, um; that of ``out`` if it was begun.
+        hours : float, optional
+            Machine time for all readings.
+        first : int
+            Poses to begin with, 6 to 60.
+        apply : bool
+            Whether what is good enough is written to the machine.
+        seed : int
+            Draws the candidates for poses.
+        out : path, optional
+            Folder of the journal; one in which something was begun is gone on with. Without,
+            ``auto-<date and time>``.
+        decide : callable, optional
+            Asked before each decision is carried out, with what and why, and the possible answers:
+            ``"go on"``, ``"skip"``, others instead, ``"stop"``; where poses are to be measured also
+            how many, ``"20 poses"``. It runs in a thread of its own. Without, all are carried out.
+        tell : callable, optional
+            Told each decision and what came of it, in a line, in the station's own thread.
+
+        Returns
+        -------
+        AutoReport
+            ``reached``, ``why``, ``decisions``, ``model``, ``runs``.
+
+        Raises
+        ------
+        BadInput
+            Without a target, for a damaged journal, and for an answer of ``decide`` that is none.
+        DeviceError, GateRefused
+            As :meth:`measure`. What a gate refuses to write ends it with a report that says so.
+        StoppedByOperator
+            After Ctrl-C, :meth:`stop`, or where ``decide`` said so; with ``out`` it goes on.
+        """
+        return self._wait(
+            self._station.auto(
+                target_um, hours=hours, first=first, apply=apply, seed=seed, out=out,
+                decide=decide, tell=tell,
+            )
+        )  # fmt: skip
 
     def propose(self, fit: File, *, limits: Mapping[str, float] | None = None) -> ApplyReport:
         """Compare a saved fit with the controller and ask the gates; nothing is written.

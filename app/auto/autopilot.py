@@ -1,24 +1,33 @@
 """The loop: decide, keep the decision, carry it out, keep what came of it, decide again."""
 
-import asyncio
 import math
+import re
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
+from app.auto.aside import aside
 from app.auto.findings import Findings, look
 from app.auto.journal import Decisions
-from app.auto.policy import SURE, Decision, Known, Limits, decide
-from app.errors import GateRefused
+from app.auto.known import HOPELESS, REFUSED, VETOED, known_by, runs_of
+from app.auto.policy import MOST, SURE, Decision, Known, Limits, decide, others
+from app.errors import GateRefused, StoppedByOperator
 from app.files.pose_table import Pose
-from app.jobs.following_up import design
+from app.jobs.following_up import FollowUpReport, design
 from calib.errors import BadInput
 
-Veto = Callable[[Decision], Awaitable[bool]]
-"""Asks the person at the machine whether a decision is to be carried out."""
+Ask = Callable[[str, tuple[str, ...]], Awaitable[str]]
+"""Puts a question with its answers to the person at the machine; returns one of them.
+
+Where the question ends with :data:`COUNT` also a number of poses: ``20 poses``.
+"""
 Tell = Callable[[str], None]
-HOPELESS, REFUSED, VETOED = "hopeless", "refused", "vetoed"
+GO, SKIP, STOP = "go on", "skip", "stop"
+COUNT = "; or say how many: 20 poses"
+LEAVE = "leave it"
+SAID = "the operator said no"
 PAYLOAD_KG, TEMPERATURE_K = 0.05, 1.0
 """How near a condition must be to how it is now, to count as being so."""
 
@@ -53,6 +62,14 @@ class Seen:
     minutes: float
 
 
+@dataclass(frozen=True)
+class Apart:
+    """Poses that tell a pair apart, or why there are none."""
+
+    plan: FollowUpReport | None
+    why_not: str = ""
+
+
 class Autopilot:
     """One unattended (or watched) calibration in a folder of its own.
 
@@ -65,7 +82,7 @@ class Autopilot:
         Of a folder that was begun earlier those of the journal stand.
     seed : int
         Draws the candidates for poses.
-    veto : coroutine function, optional
+    ask : coroutine function, optional
         Asked before every decision is carried out; nobody is if None.
     tell : callable
         Told, in a line, what is decided and what came of it.
@@ -77,47 +94,94 @@ class Autopilot:
         laboratory: Laboratory,
         limits: Limits,
         seed: int = 1,
-        veto: Veto | None = None,
+        ask: Ask | None = None,
         tell: Tell = lambda _: None,
     ) -> None:
-        self.folder, self.laboratory, self.veto, self.tell = folder, laboratory, veto, tell
+        self.folder, self.laboratory, self.ask, self.tell = folder, laboratory, ask, tell
         self.journal = Decisions(folder)
         begun = self.journal.begun
         if begun is None:
             said = {k: v for k, v in asdict(limits).items() if v != math.inf}
             begun = self.journal.write("begun", seed=seed, limits=said)
         self.limits, self.seed = Limits(**begun["limits"]), int(begun["seed"])
+        self._apart: tuple[int, Apart] | None = None
 
     async def run(self) -> Decision:
         """Decide and do until a decision says stop; that one is returned.
 
-        Raises what sessions and write-backs raise; :meth:`run` of a new Autopilot on the same
-        folder goes on.
+        Raises what sessions and write-backs raise, and StoppedByOperator where the person said
+        stop; :meth:`run` of a new Autopilot on the same folder goes on.
         """
         while True:
             known = await self._known()
-            waiting = self.journal.open
-            if waiting is not None:
-                number, decision = int(waiting["number"]), _decision(waiting)
-            else:
-                number, decision = len(self.journal.of("decided")) + 1, decide(known, self.limits)
-                self.journal.write("decided", number=number, **asdict(decision))
-            self.tell(f"{number}. {_does(decision)}: {decision.why}")
+            number, decision = await self._next(known)
+            self.tell(f"{number}. {in_words(decision)}")
             if decision.kind == "stop":
                 self.journal.write("done", number=number)
                 return decision
-            done = await self._asked(number, decision)
-            self.journal.write("done", number=number, **done)
-            if "says" in done:
-                self.tell(f"   {done['says']}")
+            wanted = await self._agreed(number, decision, known)
+            if wanted is None:
+                continue
+            number, decision = wanted
+            done = await self._carried_out(number, decision)
+            self._done(number, **done)
 
-    async def _asked(self, number: int, decision: Decision) -> dict[str, Any]:
-        """Let the person say no; else carry it out."""
-        if self.veto is not None and not await self.veto(decision):
-            no: dict[str, Any] = {VETOED: True, "says": "not done: the operator said no"}
-            if decision.pair is not None:
-                no |= {"pair": list(decision.pair), HOPELESS: "the operator said no"}
-            return no
+    async def _next(self, known: Known) -> tuple[int, Decision]:
+        """The decision that was not carried out to its end, or a new one, on the disk."""
+        waiting = self.journal.open
+        if waiting is not None:
+            return int(waiting["number"]), _decision(waiting)
+        return await self._decided(decide(known, self.limits))
+
+    async def _decided(self, decision: Decision) -> tuple[int, Decision]:
+        """Keep a decision with what is expected of it."""
+        number = len(self.journal.of("decided")) + 1
+        if decision.kind == "tell-apart":
+            plan = (await self._designed(number, decision)).plan
+            if plan is not None:
+                right = {"right_now": _least(plan.right_now), "right_then": _least(plan.right_then)}
+                decision = replace(decision, expected=right)
+        self.journal.write("decided", number=number, **asdict(decision))
+        return number, decision
+
+    def _done(self, number: int, **done: Any) -> None:
+        self.journal.write("done", number=number, **done)
+        if "says" in done:
+            self.tell(f"   {done['says']}")
+
+    # the person's part
+
+    async def _agreed(
+        self, number: int, decision: Decision, known: Known
+    ) -> tuple[int, Decision] | None:
+        """Let the person say go, skip, stop, or choose something else; None: nothing is done."""
+        hopeless = (
+            decision.kind == "tell-apart" and (await self._designed(number, decision)).why_not
+        )
+        if self.ask is None or hopeless or self.journal.session_of(number) is not None:
+            return number, decision
+        choices = {f"{one.words()} instead": one for one in others(known, self.limits, decision)}
+        text = in_words(decision) + (COUNT if decision.kind == "measure" else "")
+        given = await self.ask(text, (GO, SKIP, *choices, STOP))
+        if given == GO:
+            return number, decision
+        if given == STOP:
+            raise StoppedByOperator(
+                f"stopped before decision {number} was carried out",
+                remedy=f"Go on with the folder {self.folder}",
+            )
+        if given == SKIP:
+            self._done(number, **_vetoed(decision))
+            return None
+        chosen = choices.get(given) or counted(decision, given)
+        if chosen is None:
+            raise BadInput(f"{given!r} is no answer", remedy=f"Answer one of: {GO}, {SKIP}, {STOP}")
+        self._done(number, replaced=True, says=f"the operator chose: {chosen.words()}")
+        return await self._decided(chosen)
+
+    # what is done
+
+    async def _carried_out(self, number: int, decision: Decision) -> dict[str, Any]:
         match decision.kind:
             case "measure":
                 poses = await self.laboratory.choose(decision.count, self.seed + number)
@@ -142,34 +206,46 @@ class Autopilot:
 
         return began
 
-    async def _told_apart(self, number: int, decision: Decision) -> dict[str, Any]:
-        """Poses that tell a pair apart, if there are such; else the pair is left in question."""
+    async def _designed(self, number: int, decision: Decision) -> Apart:
+        """Poses that tell a pair apart, designed once for each decision."""
+        if self._apart is None or self._apart[0] != number:
+            self._apart = number, await self._design(number, decision)
+        return self._apart[1]
+
+    async def _design(self, number: int, decision: Decision) -> Apart:
         assert decision.pair is not None
-        one, other = decision.pair
         found = self._found()
         rest = [name for name in found.effects if name not in decision.pair]
         try:
-            plan = await asyncio.to_thread(
-                design, found.runs, (one, other), decision.count, add=rest, seed=self.seed + number
-            )
+            plan = await aside(
+                partial(
+                    design, found.runs, decision.pair, decision.count, add=rest,
+                    seed=self.seed + number,
+                )
+            )  # fmt: skip
         except BadInput as error:
-            return self._left(decision, str(error))
-        now, then = min(plan.right_now.values()), min(plan.right_then.values())
+            return Apart(None, str(error))
+        now, then = _least(plan.right_now), _least(plan.right_then)
         if then < SURE:
-            return self._left(
-                decision,
-                f"{decision.count} poses would give the right answer with a probability of "
-                f"{then:.2f} only ({now:.2f} without them)",
-            )
-        if differs := found.other_conditions(plan.conditions, PAYLOAD_KG, TEMPERATURE_K):
-            if self.veto is None:
+            why = f"would give the right answer with a probability of {then:.2f} only"
+            return Apart(plan, f"{decision.count} poses {why} ({now:.2f} without them)")
+        return Apart(plan)
+
+    async def _told_apart(self, number: int, decision: Decision) -> dict[str, Any]:
+        """Measure poses that tell a pair apart; else the pair is left in question."""
+        assert decision.pair is not None
+        one, other = decision.pair
+        apart = await self._designed(number, decision)
+        if apart.plan is None or apart.why_not:
+            return self._left(decision, apart.why_not)
+        wanted = apart.plan.conditions
+        if differs := self._found().other_conditions(wanted, PAYLOAD_KG, TEMPERATURE_K):
+            if self.ask is None:
                 return self._left(decision, f"it needs {differs}, and nobody is there to see to it")
-            changed = Decision("measure", f"put it so: {differs}; then go on", decision.count)
-            if not await self.veto(changed):
-                return self._left(decision, f"it needs {differs}, and the operator said no")
-        self.tell(f"   the right answer with a probability of {now:.2f} now, {then:.2f} then")
+            if await self.ask(f"put it so: {differs}", ("done", LEAVE)) != "done":
+                return self._left(decision, f"it needs {differs}, and {SAID}")
         title = f"tells {one} from {other}"
-        measured = await self._measured(number, plan.by_label(), title)
+        measured = await self._measured(number, apart.plan.by_label(), title)
         # A second set of the same kind would be asked for the same reason: once is decided.
         return {**measured, "pair": [one, other], HOPELESS: "they were measured for once"}
 
@@ -198,76 +274,58 @@ class Autopilot:
 
     # what is known
 
-    def _done(self) -> list[dict[str, Any]]:
-        return self.journal.of("done")
-
-    def _runs(self) -> tuple[str, ...]:
-        return tuple(line["run"] for line in self._done() if "run" in line)
-
     def _found(self) -> Findings:
         return Findings.from_json(self.journal.of("found")[-1])
 
     async def _known(self) -> Known:
         """What the journal says, and what the runs say if they were not asked yet."""
-        runs, done = self._runs(), self._done()
-        known = Known(
-            poses=sum(int(line.get("poses", 0)) for line in done),
-            minutes=sum(float(line.get("minutes", 0.0)) for line in done),
-            hopeless={tuple(line["pair"]): line[HOPELESS] for line in done if HOPELESS in line},
-        )
-        if not runs:
-            return self._refused(known, done)
+        runs = runs_of(self.journal)
         found = self.journal.of("found")
-        if not found or tuple(found[-1]["runs"]) != runs:
-            seen = await asyncio.to_thread(look, runs, self.folder / f"model-{len(runs):02}.toml")
+        if runs and (not found or tuple(found[-1]["runs"]) != runs):
+            model = self.folder / f"model-{len(runs):02}.toml"
+            seen = await aside(partial(look, runs, model))
             self.journal.write("found", **asdict(seen))
             self.tell(f"   {seen.words()}")
-        return self._refused(self._with(known, self._found(), done), done)
+        return known_by(self.journal)
 
-    def _with(self, known: Known, found: Findings, done: list[dict[str, Any]]) -> Known:
-        written = [k for k, line in enumerate(done) if "left_out" in line]
-        since = done[written[-1] :] if written else []
-        seen = [line for line in since if "verified_um" in line]
-        unknown = [line for line in self.journal.of("found") if line["unexplained"]]
-        return replace(
-            known,
-            predicted_um=found.predicted_um,
-            ambiguous=tuple((a, b) for a, b in found.ambiguous),
-            unexplained=found.unexplained,
-            rounds_unknown=max(0, len(unknown) - 1) if found.unexplained else 0,
-            verified_um=seen[-1]["verified_um"] if seen else None,
-            at_most_um=seen[-1]["at_most_um"] if seen else None,
-            applied=bool(written) and done[written[-1]]["model"] == found.model,
-            corrections=len(written),
-        )
 
-    def _refused(self, known: Known, done: list[dict[str, Any]]) -> Known:
-        """What was refused is not asked again with the same readings."""
-        last = done[-1] if done else {}
-        ended = last.get(REFUSED) or (last.get(VETOED) and HOPELESS not in last)
-        return (
-            replace(known, ended=str(last.get(REFUSED, "the operator said no"))) if ended else known
-        )
+def in_words(decision: Decision) -> str:
+    """What is done, why, and what is expected of it."""
+    expected = decision.expected
+    gain = ""
+    if "right_then" in expected:
+        now, then = expected["right_now"], expected["right_then"]
+        gain = f" (the right answer with a probability of {now:.2f} now, {then:.2f} then)"
+    elif decision.kind == "measure" and "predicted_um" in expected:
+        gain = f" ({expected['predicted_um']:.1f} um then)"
+    elif "rms_um" in expected:
+        gain = f" ({expected['rms_um']:.1f} um are expected)"
+    return f"{decision.words()}: {decision.why}{gain}"
+
+
+def counted(decision: Decision, said: str) -> Decision | None:
+    """The same measurement with another number of poses (``20 poses``), if that is said."""
+    number = re.fullmatch(r"(\d{1,3})( poses?)?", said.strip())
+    if number is None or decision.kind != "measure" or not 1 <= int(number[1]) <= MOST:
+        return None
+    why = f"{decision.why}; the operator chose how many"
+    return replace(decision, count=int(number[1]), why=why, expected={})
+
+
+def _vetoed(decision: Decision) -> dict[str, Any]:
+    no: dict[str, Any] = {VETOED: True, "ground": decision.ground, "says": f"not done: {SAID}"}
+    if decision.pair is not None:
+        no |= {"pair": list(decision.pair), HOPELESS: SAID}
+    return no
+
+
+def _least(right: Mapping[str, float]) -> float:
+    return min(right.values())
 
 
 def _decision(line: Mapping[str, Any]) -> Decision:
     pair = line["pair"]
     return Decision(
         line["kind"], line["why"], int(line["count"]), tuple(pair) if pair else None,
-        line["expected"], line["reached"],
+        line["expected"], line["reached"], line.get("ground", ""),
     )  # fmt: skip
-
-
-def _does(decision: Decision) -> str:
-    match decision.kind:
-        case "measure":
-            return f"measure {decision.count} poses"
-        case "tell-apart":
-            assert decision.pair is not None
-            return f"tell {decision.pair[0]} from {decision.pair[1]}"
-        case "apply":
-            return "write the correction"
-        case "verify":
-            return "verify at fresh poses"
-        case "stop":
-            return "stop"

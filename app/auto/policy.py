@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 Kind = Literal["measure", "tell-apart", "apply", "verify", "stop"]
+Ground = Literal["first", "pair", "unknown", "accuracy", "write", "prove", "disagree", ""]
+"""Which question a decision answers; what was declined is not asked again of the same readings."""
 
 SURE = 0.8
 """A follow-up is worth its time if it gives the right answer with this probability."""
@@ -18,6 +20,8 @@ FEWEST, MOST = 6, 60
 """Poses of one more set: fewer are not worth the walk to the machine, more are decided again."""
 SPARE = 0.9
 """Part of the target that a set of poses is planned for."""
+APART = 10
+"""Poses that tell a pair apart."""
 ROUNDS_UNKNOWN = 2
 """Sets of poses that are measured after something was found that no known effect explains."""
 
@@ -70,6 +74,8 @@ class Known:
         Whether the present model is on the machine.
     corrections : int
         How often one was written.
+    declined : tuple of str
+        Grounds of decisions to which the operator said no, since the last readings.
     """
 
     poses: int = 0
@@ -83,6 +89,7 @@ class Known:
     at_most_um: float | None = None
     applied: bool = False
     corrections: int = 0
+    declined: tuple[str, ...] = ()
     ended: str = ""
 
 
@@ -91,7 +98,8 @@ class Decision:
     """What is done next, and why.
 
     ``count`` poses; ``pair`` of effects where they are told apart; ``expected`` names what it
-    should bring, in numbers; ``reached`` is of a stop: whether the target holds.
+    should bring, in numbers; ``reached`` is of a stop: whether the target holds; ``ground`` is
+    empty where the operator chose.
     """
 
     kind: Kind
@@ -100,6 +108,22 @@ class Decision:
     pair: tuple[str, str] | None = None
     expected: Mapping[str, float] = field(default_factory=dict)
     reached: bool | None = None
+    ground: Ground = ""
+
+    def words(self) -> str:
+        """What is done, in a few words."""
+        match self.kind:
+            case "measure":
+                return f"measure {self.count} poses"
+            case "tell-apart":
+                assert self.pair is not None
+                return f"tell {self.pair[0]} from {self.pair[1]}"
+            case "apply":
+                return "write the correction"
+            case "verify":
+                return "verify at fresh poses"
+            case "stop":
+                return "stop"
 
 
 def decide(known: Known, limits: Limits) -> Decision:
@@ -107,7 +131,10 @@ def decide(known: Known, limits: Limits) -> Decision:
     if known.ended:
         return _stop(known.ended, reached=False)
     if known.poses == 0:
-        return Decision("measure", "nothing was measured yet", min(limits.first, MOST))
+        if "first" in known.declined:
+            return _declined("nothing was measured")
+        first = min(limits.first, MOST)
+        return Decision("measure", "nothing was measured yet", first, ground="first")
     if known.verified_um is not None and known.verified_um <= limits.target_um:
         return _stop(
             f"fresh poses show {shown(known)}, {limits.target_um:g} um are wanted",
@@ -117,7 +144,7 @@ def decide(known: Known, limits: Limits) -> Decision:
     asked = _apart(known, affordable) or _unknown(known, affordable)
     if asked is not None:
         return asked
-    if known.predicted_um > limits.target_um:
+    if known.predicted_um > limits.target_um and "accuracy" not in known.declined:
         return _more(known, limits, affordable)
     return _prove(known, limits, affordable)
 
@@ -140,19 +167,22 @@ def _apart(known: Known, affordable: int) -> Decision | None:
         return Decision(
             "tell-apart",
             f"the readings cannot tell {one} from {other}",
-            min(10, affordable),
+            min(APART, affordable),
             pair,
+            ground="pair",
         )
     return None
 
 
 def _unknown(known: Known, affordable: int) -> Decision | None:
-    if not known.unexplained or known.rounds_unknown >= ROUNDS_UNKNOWN or affordable < FEWEST:
+    asked_enough = known.rounds_unknown >= ROUNDS_UNKNOWN or "unknown" in known.declined
+    if not known.unexplained or asked_enough or affordable < FEWEST:
         return None
     return Decision(
         "measure",
         "something is missing that no known effect explains: more poses may show what it is",
         min(_half_again(known), affordable),
+        ground="unknown",
     )
 
 
@@ -184,6 +214,7 @@ def _more(known: Known, limits: Limits, affordable: int) -> Decision:
         f"{known.predicted_um:.1f} um are predicted, {limits.target_um:g} um are wanted",
         count,
         expected={"predicted_um": then},
+        ground="accuracy",
     )
 
 
@@ -196,25 +227,56 @@ def _prove(known: Known, limits: Limits, affordable: int) -> Decision:
     if not known.applied:
         if known.corrections and known.verified_um is not None and affordable < FEWEST:
             return _missed(known, limits)
+        if "write" in known.declined:
+            return _declined(f"{known.predicted_um:.1f} um are predicted, and nothing was written")
         return Decision(
             "apply",
             f"{known.predicted_um:.1f} um are predicted, {limits.target_um:g} um are wanted",
             expected={"predicted_um": known.predicted_um},
+            ground="write",
         )
     if known.verified_um is None:
+        if "prove" in known.declined:
+            return _declined("the correction is written, and no fresh pose has shown what it is")
         return Decision(
             "verify",
             "only fresh poses show what the machine keeps",
             expected={"rms_um": known.predicted_um},
+            ground="prove",
         )
-    if known.corrections > 1 or affordable < FEWEST:
+    if known.corrections > 1 or affordable < FEWEST or "disagree" in known.declined:
         return _missed(known, limits)
     return Decision(
         "measure",
         f"fresh poses show {shown(known)}, {known.predicted_um:.1f} um were predicted: "
         "the model lacks something that these readings do not show",
         min(_half_again(known), affordable),
+        ground="disagree",
     )
+
+
+def others(known: Known, limits: Limits, proposed: Decision) -> tuple[Decision, ...]:
+    """What the operator may choose instead of what is proposed."""
+    why = "the operator chose it"
+    if known.poses == 0:
+        return ()
+    affordable = _affordable(known, limits)
+    found = []
+    if affordable >= FEWEST:
+        if proposed.kind != "measure":
+            found.append(Decision("measure", why, min(_half_again(known), affordable)))
+        found += [
+            Decision("tell-apart", why, min(APART, affordable), pair)
+            for pair in dict.fromkeys(known.ambiguous)
+            if pair != proposed.pair
+        ]
+    good = math.isfinite(known.predicted_um)
+    if limits.apply and good and not known.applied and proposed.kind != "apply":
+        expected = {"predicted_um": known.predicted_um}
+        found.append(Decision("apply", why, expected=expected))
+    if known.applied and proposed.kind != "verify":
+        found.append(Decision("verify", why, expected={"rms_um": known.predicted_um}))
+    return tuple(found)
 
 
 def _missed(known: Known, limits: Limits) -> Decision:
@@ -230,6 +292,10 @@ def shown(known: Known) -> str:
     assert known.verified_um is not None
     limit = "" if known.at_most_um is None else f" (95 %: at most {known.at_most_um:.1f} um)"
     return f"{known.verified_um:.1f} um RMS{limit}"
+
+
+def _declined(why: str) -> Decision:
+    return _stop(f"{why}: the operator said no", reached=False)
 
 
 def _stop(why: str, *, reached: bool | None) -> Decision:

@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from app.auto.autopilot import HOPELESS, Autopilot
+from app.auto.autopilot import Autopilot
+from app.auto.known import HOPELESS
 from app.auto.policy import Decision
 from app.jobs.automatic import AutoReport
 

@@ -1,72 +1,72 @@
 """Decisions carried out on a station: sessions that are journaled as every other, and the gates."""
 
-import asyncio
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from app.auto.aside import aside
 from app.auto.autopilot import Seen
 from app.auto.findings import fresh_poses
 from app.files.fits import read_fit
 from app.files.pose_table import Pose
 from app.files.runs import read_run
-from app.files.site import Site
 from app.jobs.measuring import begin_measuring
 from app.jobs.posing import choose_poses
-from app.session.events import Event
+from app.jobs.verifying import begin_verifying
 from app.session.session import Outcome, Session
 from app.session.station import Station
-from app.verification import Verification, judge_session, verification_plan
+from app.verification import Verification, judge_session
 from app.writeback.gates import Gates
 from app.writeback.procedure import WriteBack
 from calib.errors import BadInput
 
-Hear = Callable[[Event], None]
 SURE_SIGMAS = 1.645
 """One-sided, 95 %."""
 
 
 class StationLaboratory:
-    """A site's controller and tracker.
+    """A station with its controller and tracker, connected when something is carried out.
 
     Parameters
     ----------
-    site : Site
-    site_file : Path
-        Where it was read from.
+    station : Station
+        Whoever made it closes it.
     folder : Path
         Where sessions get their folders.
     unattended : bool
         Nobody answers the questions of sessions.
-    hear : callable
-        Told every event of the sessions.
     """
 
-    def __init__(
-        self, site: Site, site_file: Path, folder: Path, unattended: bool, hear: Hear
-    ) -> None:
-        self._site, self._site_file, self._folder = site, site_file, folder
-        self._unattended, self._hear = unattended, hear
+    def __init__(self, station: Station, folder: Path, *, unattended: bool) -> None:
+        self._station, self._folder, self._unattended = station, folder, unattended
         self._running: Session | WriteBack | None = None
 
+    @property
+    def running(self) -> Session | None:
+        """The session that runs at this moment, one of a write-back's among them."""
+        return self._running.running if isinstance(self._running, WriteBack) else self._running
+
+    @property
+    def moves(self) -> bool:
+        """Whether a job is under way on the machine; else there is only arithmetic."""
+        return self._running is not None
+
     async def stop(self) -> None:
-        """Stop whatever moves at this moment."""
+        """Stop whatever moves at this moment; the job under way ends as it ends when stopped."""
         if self._running is not None:
             await self._running.stop()
 
     def answer(self, prompt: str, choice: str) -> None:
         """Answer a question of the session that runs."""
-        running = self._running.running if isinstance(self._running, WriteBack) else self._running
-        if running is not None:
-            running.answer_prompt(prompt, choice)
+        if self.running is not None:
+            self.running.answer_prompt(prompt, choice)
 
     async def choose(self, count: int, seed: int) -> Mapping[str, Pose]:
         """Poses for accuracy, see :func:`app.jobs.posing.choose_poses`."""
-        report = await asyncio.to_thread(
-            lambda: choose_poses(site=self._site_file, n=count, seed=seed)
-        )
+        report = await aside(lambda: choose_poses(site=self._station.site, n=count, seed=seed))
         return report.by_label()
 
     async def measure(
@@ -80,8 +80,9 @@ class StationLaboratory:
         session = self._again(again)
         if session is None:
             session = begin_measuring(
-                self._site, poses, folder=self._folder, title=title, unattended=self._unattended
-            )
+                self._station.site, poses, folder=self._folder, title=title,
+                station=self._station, unattended=self._unattended,
+            )  # fmt: skip
             began(str(session.folder))
         outcome = await self._run(session)
         return str(outcome.run_folder), _minutes(outcome)
@@ -90,11 +91,15 @@ class StationLaboratory:
         """Measure fresh poses in a session of its own."""
         session = self._again(again)
         if session is None:
-            plan = verification_plan(self._site, fresh_poses(self._site.machine), truth=False)
-            session = Session.create(self._site, plan, self._folder, unattended=self._unattended)
+            poses = await aside(partial(fresh_poses, self._station.site.machine))
+            session = begin_verifying(
+                self._station.site, poses, folder=self._folder, station=self._station,
+                unattended=self._unattended,
+            )  # fmt: skip
             began(str(session.folder))
         outcome = await self._run(session)
-        return Seen(*own_part_um(judge_session(outcome.folder)), _minutes(outcome))
+        judged = await aside(partial(judge_session, outcome.folder))
+        return Seen(*own_part_um(judged), _minutes(outcome))
 
     async def apply(self, model: Path) -> Mapping[str, str]:
         """Write a model through the gates and keep it; what was left out, and why."""
@@ -102,38 +107,37 @@ class StationLaboratory:
         async def keep(*_: object) -> bool:
             return True  # every gate has passed
 
-        station = Station(self._site)
         job = WriteBack(
-            station, read_fit(model), Gates.with_limits({}), self._folder, keep, self._unattended
-        )
-        leave = station.observers.watch(self._hear)
-        self._running = job
-        try:
-            await station.connect()
+            self._station, read_fit(model), Gates.with_limits({}), self._folder, keep,
+            self._unattended,
+        )  # fmt: skip
+        with self._under_way(job):
+            await self._station.connect()
             return (await job.run()).proposal.left_out
-        finally:
-            self._running = None
-            leave()
-            await station.close()
 
     def _again(self, folder: str | None) -> Session | None:
         """A session that was begun before this program was, if it is still there."""
         if folder is None:
             return None
         with suppress(BadInput):
-            return Session.reopen(Path(folder), unattended=self._unattended)
+            return Session.reopen(Path(folder), station=self._station, unattended=self._unattended)
         return None
 
     async def _run(self, session: Session) -> Outcome:
-        leave = session.observers.watch(self._hear)
-        self._running = session
         try:
-            await session.connect()
-            return await session.run()
+            with self._under_way(session):
+                await self._station.connect()
+                return await session.run()
+        finally:
+            session.journal.close()
+
+    @contextmanager
+    def _under_way(self, job: Session | WriteBack) -> Iterator[None]:
+        self._running = job
+        try:
+            yield
         finally:
             self._running = None
-            leave()
-            await session.close()
 
 
 def own_part_um(seen: Verification) -> tuple[float, float]:

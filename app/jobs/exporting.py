@@ -17,6 +17,7 @@ from jinja2.sandbox import SandboxedEnvironment
 from app.files.fits import SavedFit, read_fit
 from app.files.text import read_text
 from app.hosted.parameters import effect_of
+from app.jobs.chosen_runs import File
 from app.jobs.corrector import machine_of
 from app.jobs.urdf import urdf_of
 from calib.command.identified import commandable
@@ -103,20 +104,34 @@ def _number(fit: SavedFit, name: str, beside: float) -> Number:
     return Number(name, found.value + beside, found.sigma, found.unit, group, what)
 
 
-def export(model: Path, form: str, machine: str | None = None) -> str:
-    """The text of a model's corrected parameters.
+def export(model: File, form: str, *, machine: str | None = None) -> str:
+    """Write the corrected parameters of a model in a controller's own words.
 
     Parameters
     ----------
+    model : path
+        A model file.
     form : str
-        ``json``, ``toml``, a shipped template (:data:`SHIPPED`), or the path of one's own.
+        ``json``, ``toml``, ``urdf``, a shipped template (``csv``, ``gcode-delta``, ``hal``,
+        ``p-variables``), or the path of one's own.
+    machine : str, optional
+        Machine file, where it is not the one that the model names.
+
+    Returns
+    -------
+    str
+        The text.
 
     Raises
     ------
     BadInput
         For a model that does not suit, or a template with a fault; with its line.
+
+    Examples
+    --------
+    >>> print(pkmcal.export("model.toml", "hal"))                            # doctest: +SKIP
     """
-    found = corrected(model, machine)
+    found = corrected(Path(model), machine)
     if form == "urdf":
         return urdf_of(
             found.machine,

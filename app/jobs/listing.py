@@ -55,14 +55,56 @@ class LogReport(Report):
     entries: tuple[HappeningEntry, ...]
 
 
-def list_sessions(folder: File) -> SessionsReport:
-    """List the sessions in a folder."""
+def list_sessions(folder: File = "sessions") -> SessionsReport:
+    """List the sessions in a folder, the newest first: what each was and how far it came.
+
+    Parameters
+    ----------
+    folder : path
+        Where the sessions are.
+
+    Returns
+    -------
+    SessionsReport
+        Empty where there is no session.
+
+    Raises
+    ------
+    BadInput
+        Never for a session that cannot be read: that one is ``broken``.
+
+    Examples
+    --------
+    >>> [one.title for one in pkmcal.list_sessions().sessions]               # doctest: +SKIP
+    """
     found = [_entry(facts) for facts in sessions_under(Path(folder))]
     return SessionsReport.of({"format": SessionsReport.FORMAT, "sessions": found})
 
 
-def session_log(session: File | None, folder: File) -> LogReport:
-    """What happened in a session, the newest in ``folder`` if None; raises BadInput."""
+def session_log(session: File | None = None, *, folder: File = "sessions") -> LogReport:
+    """Read what happened in a session, by the clock: steps, alarms, questions and answers.
+
+    Parameters
+    ----------
+    session : path, optional
+        Its folder; the newest one in ``folder`` if None.
+    folder : path
+        Where the sessions are.
+
+    Returns
+    -------
+    LogReport
+
+    Raises
+    ------
+    BadInput
+        If there is no session, or its files cannot be read.
+
+    Examples
+    --------
+    >>> for one in pkmcal.session_log().entries:                             # doctest: +SKIP
+    ...     print(one.utc, one.kind, one.text)
+    """
     chosen = latest_session(Path(folder)) if session is None else Path(session)
     entries = [vars(one) for one in happenings(chosen)]
     said = {"format": LogReport.FORMAT, "session": _entry(facts_of(chosen)), "entries": entries}

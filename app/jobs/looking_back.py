@@ -82,7 +82,7 @@ class HistoryReport(Report):
 
 
 def history_of(
-    folder: File, *, serial: str = "", tolerance_um: float | None = None
+    folder: File = "sessions", *, serial: str = "", tolerance_um: float | None = None
 ) -> HistoryReport:
     """Read the history of a folder; verifications that are not in it yet are judged and entered.
 
@@ -95,10 +95,18 @@ def history_of(
     tolerance_um : float, optional
         For the forecast: largest position error that is allowed.
 
+    Returns
+    -------
+    HistoryReport
+
     Raises
     ------
     BadInput
         If the database cannot be read.
+
+    Examples
+    --------
+    >>> pkmcal.history_of(tolerance_um=25.0).machines[0].errors              # doctest: +SKIP
     """
     root = Path(folder)
     remember_verifications(root)

@@ -11,8 +11,8 @@ import numpy as np
 from app.files.machines import load_machine
 from app.files.pose_table import Pose, poses_text
 from app.files.poses import full_poses, nest_matrix, render_design, render_pose_file
-from app.files.site import Limits, load_site
-from app.jobs.chosen_runs import File, at_least, path_of
+from app.files.site import Limits, Site, load_site
+from app.jobs.chosen_runs import File, at_least
 from app.jobs.record import Record, Report
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
@@ -143,7 +143,7 @@ def choose_poses(
     machine: str | os.PathLike[str] | None = None,
     n: int = 29,
     *,
-    site: File | None = None,
+    site: File | Site | None = None,
     criterion: Literal["I", "D"] = "I",
     priors: bool = True,
     heights: bool = False,
@@ -161,9 +161,9 @@ def choose_poses(
         A shipped machine's name, or a machine file; that of the site if missing.
     n : int
         How many poses.
-    site : path, optional
-        A site file: its nests are read. Without, whole poses are, with the noise of Han et al.
-        2020.
+    site : path or Site, optional
+        A site file, or what was read of one: its nests are read. Without, whole poses are, with
+        the noise of Han et al. 2020.
     criterion : "I" or "D"
         Smallest predicted pose error, or most information about the parameters.
     priors : bool
@@ -198,12 +198,12 @@ def choose_poses(
     """
     at_least(1, n=n, candidates=candidates)
     named = "" if machine is None else os.fspath(machine)
-    path = path_of(site)
-    described = _machine(named, path)
-    margin = _margin(described, path, margin_mm)
+    here = _site(site)
+    described = _machine(named, here)
+    margin = _margin(described, here, margin_mm)
     found = design_poses(
         described,
-        _readings(described, path, heights, sigma_um, angle_mdeg),
+        _readings(described, here, heights, sigma_um, angle_mdeg),
         n,
         np.random.default_rng(seed),
         criterion=criterion,
@@ -218,7 +218,7 @@ def choose_poses(
         f"--criterion {criterion} --seed {seed} --candidates {candidates}"
     )
     command += "" if priors else " --no-priors"
-    command += f" --site {site}" if site else ""
+    command += f" --site {here.source}" if here else ""
     command += " --heights" if heights else ""
     command += f" --sigma-um {sigma_um:g}" if sigma_um is not None else ""
     command += f" --angle-mdeg {angle_mdeg:g}" if angle_mdeg is not None else ""
@@ -252,7 +252,7 @@ def verification_grid(
     >>> len(pkmcal.verification_grid("hexapod").poses)                       # doctest: +SKIP
     216
     """
-    described = _machine("" if machine is None else os.fspath(machine), path_of(site))
+    described = _machine("" if machine is None else os.fspath(machine), _site(site))
     grid = verification_poses(described)
     box = {
         name: [low, high] if name in "xyz" else [float(np.rad2deg(low)), float(np.rad2deg(high))]
@@ -268,17 +268,23 @@ def verification_grid(
     return GridReport.of(said, _grid=grid)
 
 
-def _machine(name: str, site: Path | None) -> Machine:
+def _site(site: File | Site | None) -> Site | None:
+    if site is None or isinstance(site, Site):
+        return site
+    return load_site(Path(site))
+
+
+def _machine(name: str, site: Site | None) -> Machine:
     if name:
         return load_machine(name)
     if site:
-        return load_site(site).machine
+        return site.machine
     raise BadInput("no machine is named", remedy="Write pkmcal poses hexapod, or give --site.")
 
 
 def _readings(
     machine: Machine,
-    site_file: Path | None,
+    site: Site | None,
     heights: bool,
     sigma_um: float | None,
     angle_mdeg: float | None,
@@ -290,11 +296,10 @@ def _readings(
     if heights:
         if angle_mdeg is not None:
             raise BadInput("heights have no angle", remedy="Leave --angle-mdeg out.")
-        nests = nest_matrix(load_site(site_file).platform_nests) if site_file else np.zeros((3, 1))
+        nests = nest_matrix(site.platform_nests) if site else np.zeros((3, 1))
         sigma = (PROBE_SIGMA_UM if sigma_um is None else sigma_um) * 1e-3
         return DirectionReadings(nests, np.array([[0.0], [0.0], [1.0]]), sigma)
-    if site_file:
-        site = load_site(site_file)
+    if site:
         sigma = (SITE_SIGMA_UM if sigma_um is None else sigma_um) * 1e-3
         return NestReadings(nest_matrix(site.platform_nests), sigma, nest_matrix(site.base_nests))
     sigma = HAN_2020.position_sigma if sigma_um is None else sigma_um * 1e-3
@@ -304,10 +309,10 @@ def _readings(
     return PoseNoise(sigma, HAN_2020.angle_sigma if turns else None)
 
 
-def _margin(machine: Machine, site_file: Path | None, margin_mm: float | None) -> Margin:
+def _margin(machine: Machine, site: Site | None, margin_mm: float | None) -> Margin:
     """What tolerances need, and at strokes what effects add to it where the host compensates."""
     if margin_mm is None:
-        margin_mm = (load_site(site_file).limits if site_file else Limits()).margin_mm
+        margin_mm = (site.limits if site else Limits()).margin_mm
     if margin_mm < 0.0:
         raise BadInput(f"--margin-mm is {margin_mm:g}", remedy="Give 0 or more.")
     return stroke_margin(machine, margin_mm)

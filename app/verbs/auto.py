@@ -4,21 +4,18 @@ Every decision is journaled with its reason before it is carried out; see docs/a
 """
 
 import asyncio
-import math
-from datetime import datetime
 from pathlib import Path
 
 import click
 
 from app import answer
-from app.auto import Decision, Limits
-from app.auto.autopilot import Autopilot
-from app.auto.report import report_of
+from app.auto import Limits
+from app.auto.flight import FEWEST_FIRST, MOST_FIRST, Flight, folder_of, limits_of
 from app.auto.station import StationLaboratory
 from app.console import ConsoleFace, in_daemon_thread, stopping, unattended
 from app.files.site import load_site
 from app.jobs.automatic import AutoReport
-from calib.errors import BadInput
+from app.session.station import Station
 
 
 @click.command()
@@ -37,7 +34,7 @@ from calib.errors import BadInput
     "--first",
     default=15,
     show_default=True,
-    type=click.IntRange(6, 60),
+    type=click.IntRange(FEWEST_FIRST, MOST_FIRST),
     help="Poses to begin with.",
 )
 @click.option("--no-apply", is_flag=True, help="Write nothing to the machine.")
@@ -66,15 +63,11 @@ def command(
     told apart is measured for, more poses are measured while the prediction is above the target,
     and what is good enough is written through the gates and verified at fresh poses. It stops
     when the target holds, when nothing that can be afforded would change the answer, or at the
-    limit. With somebody at the terminal every decision is asked first.
+    limit. With somebody at the terminal every decision is asked first: it may be skipped, or
+    another one chosen.
     """
-    folder = (out or Path(f"auto-{datetime.now():%Y%m%d-%H%M%S}")).resolve()
-    begun = (folder / "decisions.jsonl").exists()
-    if target_um is None and not begun:
-        raise BadInput("no target", remedy="Say the accuracy that is wanted: --target-um 8")
-    folder.mkdir(parents=True, exist_ok=True)
-    minutes = math.inf if hours is None else 60.0 * hours
-    limits = Limits(target_um or 1.0, minutes, first, not no_apply)
+    folder = folder_of(out)
+    limits = limits_of(folder, target_um, hours, first, apply=not no_apply)
     report = asyncio.run(
         fly(site_file, folder, limits, seed, alone=unattended(alone), quiet=as_json)
     )
@@ -85,25 +78,32 @@ async def fly(
     site_file: Path, folder: Path, limits: Limits, seed: int, *, alone: bool, quiet: bool
 ) -> AutoReport:
     """Decide and do on a site's station; ``quiet``: of sessions nothing is told but decisions."""
+    station = Station(load_site(site_file))
+    laboratory = StationLaboratory(station, folder / "sessions", unattended=alone)
+    station.observers.watch(ConsoleFace(laboratory.answer, 0, quiet=quiet).hear)
+    flight = Flight(laboratory, folder, limits, seed, None if alone else ask, answer.say)
+    try:
+        with stopping(flight.stop):
+            return await flight.run()
+    finally:
+        await station.close()
 
-    def reply(prompt: str, choice: str) -> None:
-        laboratory.answer(prompt, choice)
 
-    face = ConsoleFace(reply, 0, quiet=quiet)
-    laboratory = StationLaboratory(
-        load_site(site_file), site_file, folder / "sessions", alone, face.hear
-    )
+async def ask(text: str, answers: tuple[str, ...]) -> str:
+    """Ask the person at the terminal; answers are numbered, the first is proposed."""
 
-    async def veto(decision: Decision) -> bool:
-        text = f"{decision.why}. Go on?"
-        given = await in_daemon_thread(
-            lambda: "y" if click.confirm(text, default=True, err=True) else "n"
-        )
-        return given == "y"
+    def asked() -> str:
+        for number, one in enumerate(answers, start=1):
+            answer.say(f"  {number}  {one}")
+        while True:
+            given: str = click.prompt(f"{text}. Which", default="1", err=True)
+            if given in answers or given.endswith(" poses"):
+                return given
+            if given.isdigit() and 1 <= int(given) <= len(answers):
+                return answers[int(given) - 1]
+            answer.say(f"one of 1 to {len(answers)}")
 
-    pilot = Autopilot(folder, laboratory, limits, seed, None if alone else veto, answer.say)
-    with stopping(laboratory.stop):
-        return report_of(pilot, await pilot.run(), folder)
+    return await in_daemon_thread(asked)
 
 
 def words(report: AutoReport) -> str:

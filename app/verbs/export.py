@@ -30,7 +30,7 @@ def command(model: Path, form: str, machine: str | None, out: Path | None, force
     Nothing is sent. A template is sandboxed, and what it names without its being there is a fault
     with its line.
     """
-    text = export(model, form, machine)
+    text = export(model, form, machine=machine)
     if out is None:
         click.echo(text, nl=False)
         return

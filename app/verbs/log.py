@@ -24,7 +24,7 @@ QUIET = ("started",)
 @answer.json_option
 def command(session: Path | None, folder: Path, everything: bool, as_json: bool) -> None:
     """Read the journal of SESSION: steps, alarms, questions and answers, with clock times."""
-    found = session_log(session, folder)
+    found = session_log(session, folder=folder)
     head = found.session
     lines = [
         f"{head.folder}: {head.purpose}, {head.machine} {head.serial}, {head.title}".rstrip(", "),

@@ -11,6 +11,7 @@ from app.auto.autopilot import Autopilot, Seen
 from app.auto.journal import NAME, Decisions
 from app.auto.policy import Decision, Limits
 from app.auto.report import report_of
+from app.errors import StoppedByOperator
 from app.files.pose_table import Pose, poses_text
 from app.jobs.posing import choose_poses
 from app.jobs.simulating import simulate
@@ -54,6 +55,19 @@ class Simulated:
         return Seen(3.0, 5.0, 40.0)
 
 
+class Operator:
+    """Gives the answers one after the other, and then always the last one."""
+
+    def __init__(self, *answers: str) -> None:
+        self.answers, self.asked = list(answers), list[str]()
+
+    async def __call__(self, text: str, answers: tuple[str, ...]) -> str:
+        assert answers[:2] == ("go on", "skip")
+        assert answers[-1] == "stop"
+        self.asked.append(text)
+        return self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
+
+
 def fly(folder: Path, laboratory: Simulated, **more: object) -> tuple[Autopilot, Decision]:
     pilot = Autopilot(folder, laboratory, Limits(8.0, first=12), **more)  # type: ignore[arg-type]
     return pilot, asyncio.run(pilot.run())
@@ -83,16 +97,54 @@ def test_a_fault_is_raised_and_the_same_session_is_gone_on_with(tmp_path: Path) 
     with (tmp_path / NAME).open("ab") as file:
         file.write(b'{"event": "do')  # killed while it wrote
     laboratory = Simulated(tmp_path)
-    asked: list[Decision] = []
-
-    async def veto(decision: Decision) -> bool:
-        asked.append(decision)
-        return len(asked) == 1
-
-    _, last = fly(tmp_path, laboratory, veto=veto)
+    operator = Operator("skip")
+    _, last = fly(tmp_path, laboratory, ask=operator)
     assert laboratory.asked[0] == (str(tmp_path / "run-0"), str(tmp_path / "run-0"))
+    assert [text.split(":")[0] for text in operator.asked] == ["write the correction"]
     assert (last.kind, last.reached) == ("stop", False)
+    assert "the operator said no" in last.why
     assert laboratory.written == []
+
+
+@pytest.mark.long
+def test_a_person_chooses_how_many_poses_stops_and_comes_back(tmp_path: Path) -> None:
+    laboratory = Simulated(tmp_path)
+    operator = Operator("14 poses", "stop")
+    with pytest.raises(StoppedByOperator, match=str(tmp_path)):
+        fly(tmp_path, laboratory, ask=operator)
+    said = [line["says"] for line in Decisions(tmp_path).of("done")]
+    assert said[0] == "the operator chose: measure 14 poses"
+    assert said[1].startswith("14 poses in")
+    assert laboratory.written == []
+    # What was asked last is asked again; then the machine is measured once more instead.
+    operator = Operator("measure 7 poses instead", "go on", "go on")
+    pilot, last = fly(tmp_path, laboratory, ask=operator)
+    assert (last.kind, last.reached) == ("stop", True)
+    report = report_of(pilot, last, tmp_path)
+    assert faults_of(report.to_json()) == []
+    assert [(d.kind, d.count) for d in report.decisions] == [
+        ("measure", 12), ("measure", 14), ("apply", 0), ("measure", 7), ("apply", 0), ("verify", 0),
+        ("stop", 0),
+    ]  # fmt: skip
+    assert report.poses == 21
+
+
+def test_an_answer_that_is_none_is_refused_and_the_decision_stays(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="no answer"):
+        fly(tmp_path, Simulated(tmp_path), ask=Operator("perhaps"))
+    assert Decisions(tmp_path).open is not None
+
+
+def test_journals_of_before_grounds_were_kept_end_as_they_ended(tmp_path: Path) -> None:
+    lines = [
+        {"event": "begun", "seed": 1, "limits": {"target_um": 8.0, "first": 12, "apply": True}},
+        {"event": "decided", "number": 1, "kind": "measure", "why": "nothing was measured yet",
+         "count": 12, "pair": None, "expected": {}, "reached": None},
+        {"event": "done", "number": 1, "vetoed": True, "says": "not done: the operator said no"},
+    ]  # fmt: skip
+    (tmp_path / NAME).write_text("".join(json.dumps(line) + "\n" for line in lines))
+    _, last = fly(tmp_path, Simulated(tmp_path))
+    assert (last.kind, last.why) == ("stop", "the operator said no")
 
 
 def test_a_damaged_journal_is_named(tmp_path: Path) -> None:

@@ -7,10 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.auto import Decision, Known, Limits, decide
-from app.auto.policy import FEWEST, MOST
+from app.auto.policy import FEWEST, MOST, others
 
 EFFECTS = st.sampled_from(["backlash", "screw-pitch", "thermal-growth", "frame-shift"])
 PAIRS = st.tuples(EFFECTS, EFFECTS)
+GROUNDS = st.sampled_from(["first", "unknown", "accuracy", "write", "prove", "disagree"])
 UM = st.floats(0.1, 500.0)
 knowns = st.builds(
     Known,
@@ -24,6 +25,7 @@ knowns = st.builds(
     verified_um=st.none() | UM,
     applied=st.booleans(),
     corrections=st.integers(0, 3),
+    declined=st.lists(GROUNDS, max_size=3).map(tuple),
 )
 limits = st.builds(
     Limits,
@@ -36,7 +38,8 @@ limits = st.builds(
 
 @given(limits)
 def test_a_first_set_is_measured_before_anything_else(wanted: Limits) -> None:
-    assert decide(Known(), wanted) == Decision("measure", "nothing was measured yet", wanted.first)
+    first = decide(Known(), wanted)
+    assert first == Decision("measure", "nothing was measured yet", wanted.first, ground="first")
 
 
 @given(knowns, limits)
@@ -63,7 +66,30 @@ def test_nothing_is_written_that_is_in_question_or_not_good_enough(
     if decide(known, wanted).kind == "apply":
         assert wanted.apply
         assert not known.applied
-        assert known.predicted_um <= wanted.target_um
+        assert known.predicted_um <= wanted.target_um or "accuracy" in known.declined
+
+
+@given(knowns, limits)
+def test_what_the_person_has_declined_is_not_proposed_again(known: Known, wanted: Limits) -> None:
+    decision = decide(known, wanted)
+    assert decision.ground not in known.declined
+    after = replace(known, declined=(*known.declined, decision.ground))
+    assert decide(after, wanted) != decision or decision.kind in ("stop", "tell-apart")
+
+
+@given(knowns, limits)
+def test_what_may_be_chosen_instead_is_possible_and_another(known: Known, wanted: Limits) -> None:
+    proposed = decide(known, wanted)
+    found = others(known, wanted, proposed)
+    said = [one.words() for one in found]
+    assert len(set(said)) == len(said)
+    for one in found:
+        assert (one.kind, one.pair) != (proposed.kind, proposed.pair)
+        assert one.ground == ""
+        assert one.kind != "apply" or (wanted.apply and not known.applied)
+        if one.count:
+            each = known.minutes / known.poses
+            assert one.count * each <= wanted.minutes - known.minutes or each == 0.0
 
 
 @given(knowns, limits)

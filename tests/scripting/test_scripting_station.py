@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import re
 import signal
 import threading
 import time
@@ -17,6 +18,7 @@ import pkmcal
 from app.cli import run
 from app.session import events as ev
 from mocks.control import ControlClient
+from tests.answers import faults_of
 
 SCALE = 1500.0
 
@@ -219,3 +221,41 @@ def test_a_machine_has_one_owner_and_is_let_go(site: Path, tmp_path: Path) -> No
     began = time.monotonic()
     station.close()
     assert time.monotonic() - began < 1.0
+
+
+@pytest.mark.long
+@pytest.mark.timeout(180)
+def test_a_script_decides_with_the_autopilot_stops_it_and_goes_on(
+    site: Path, tmp_path: Path
+) -> None:
+    asked: list[str] = []
+
+    def decide(text: str, answers: tuple[str, ...]) -> str:
+        asked.append(text)
+        assert answers[:2] == ("go on", "skip")
+        if text.startswith("measure"):
+            return "7 poses"
+        return "skip" if text.startswith("tell") else "stop"
+
+    told: list[str] = []
+    folder = tmp_path / "auto"
+    with pkmcal.Station(site, folder=tmp_path / "sessions") as station:
+        with pytest.raises(pkmcal.BadInput, match="no target"):
+            station.auto(out=folder)
+        with pytest.raises(pkmcal.StoppedByOperator, match=re.escape(str(folder))):
+            station.auto(1000.0, apply=True, out=folder, decide=decide, tell=told.append)
+        assert [text.split(":")[0] for text in asked][-1] == "write the correction"
+        found = station.auto(out=folder, tell=told.append)
+    assert faults_of(found.to_json()) == []
+    assert found.reached is True
+    assert found.target_um == 1000.0
+    assert found.poses == 7
+    assert [one.kind for one in found.decisions][-3:] == ["apply", "verify", "stop"]
+    assert told[0].startswith("1. measure 15 poses: nothing was measured yet")
+    sessions = pkmcal.list_sessions(folder / "sessions").sessions
+    assert [one.purpose for one in sessions].count("measure") == 1
+    log = pkmcal.session_log(folder=folder / "sessions")
+    assert log.session.folder == sessions[0].folder
+    assert log.entries
+    events = pkmcal.history_of(folder / "sessions").machines[0].events
+    assert "applied" in [event.kind for event in events]

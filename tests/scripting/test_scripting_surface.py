@@ -23,15 +23,19 @@ SIGNATURES = {
     "watch=None",
     "diagnose": "runs, *, add=(), model=None, offer=(), mask=(), watch=None",
     "discover": "runs, *, add=(), model=None, offer=(), mask=(), watch=None",
+    "export": "model, form, *, machine=None",
     "fit": "runs, *, add=(), model=None, mask=()",
     "guess_map": "files, out, *, machine=None",
+    "history_of": "folder='sessions', *, serial='', tolerance_um=None",
     "import_run": "files, map, run, *, machine=None, header=None, commands=None, "
     "as_it_stands=False",
     "kinematics": "machine, file, direction, *, model=None",
+    "list_sessions": "folder='sessions'",
     "load_machine": "name_or_path, relative_to=None",
     "load_runs": "runs",
     "mock_station": "machine='hexapod', *, seed=1, scale=600.0, effects=None, folder=None",
     "predict": "model, runs, *, frame=False",
+    "session_log": "session=None, *, folder='sessions'",
     "simulate": "machine, run, *, seed=1, poses=60, noise_um=None, effects=None, hidden=None, "
     "truth=None, parameters=None, controller=None, cycles=1, order='nest-by-nest', payload=(), "
     "rise=6.0, delays=False, strays=0, title=''",
@@ -40,6 +44,8 @@ SIGNATURES = {
 JOBS = {
     "accept": "self",
     "apply": "self, fit, *, yes=False, limits=None",
+    "auto": "self, target_um=None, *, hours=None, first=15, apply=True, seed=1, out=None, "
+    "decide=None, tell=None",
     "close": "self",
     "connect": "self",
     "measure": "self, poses, *, order=None, reference_every=10, cycles=1, warm_up=True, title=''",
@@ -54,6 +60,8 @@ MADE = "site, *, folder='sessions', operator=None, watch=None"
 FIELDS = {
     "AcceptReport": "accepted",
     "ApplyReport": "written changes left_out snapshot kept check_before check_after noise_peak_um",
+    "AutoReport": "folder target_um reached why decisions runs model effects in_question poses "
+    "minutes predicted_um verified_um at_most_um",
     "CompareReport": "effects readings rms_um noise_floor_um chi2_per_dof repeatability "
     "reference_repeatability structure together actuators worst_poses bad_readings record advice "
     "proposed",
@@ -71,14 +79,17 @@ FIELDS = {
     "advice",
     "GridReport": "machine workspace_scale box poses",
     "GuessReport": "map columns rows preview assumed missing",
+    "HistoryReport": "machines",
     "ImportReport": "runs machine map rows readings poses assumed record",
     "KinematicsReport": "machine model direction actuators units places",
+    "LogReport": "session entries",
     "PredictReport": "model machine effects frame readings rms_um expected_um noise_um ratio "
     "chi2_per_dof log10_p p_value axes nests worst not_in_model bad_readings left_out_readings "
     "remarks record advice",
     "PosesReport": "machine criterion readings tolerances_as_priors candidates seed predicted "
     "random_poses by_count path_in_strokes kept_free poses",
     "SessionReport": "session run readings",
+    "SessionsReport": "sessions",
     "SetsReport": "sets unknown",
     "SimulationReport": "machine run truth seed poses readings hidden",
     "UndoReport": "restored",

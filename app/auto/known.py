@@ -1,0 +1,69 @@
+"""What is known by now, read from the journal of decisions."""
+
+from dataclasses import replace
+from typing import Any
+
+from app.auto.findings import Findings
+from app.auto.journal import Decisions
+from app.auto.policy import Known
+
+HOPELESS, REFUSED, VETOED = "hopeless", "refused", "vetoed"
+"""Keys of what came of a decision: a pair that stays in question, a gate's no, a person's no."""
+
+
+def runs_of(journal: Decisions) -> tuple[str, ...]:
+    """Folders of all runs that were measured for the fit, in order."""
+    return tuple(line["run"] for line in journal.of("done") if "run" in line)
+
+
+def known_by(journal: Decisions) -> Known:
+    """Everything that the next decision rests on."""
+    done = journal.of("done")
+    known = Known(
+        poses=sum(int(line.get("poses", 0)) for line in done),
+        minutes=sum(float(line.get("minutes", 0.0)) for line in done),
+        hopeless={tuple(line["pair"]): line[HOPELESS] for line in done if HOPELESS in line},
+        declined=_declined(done),
+        ended=_ended(done),
+    )
+    return _with_findings(known, journal, done) if runs_of(journal) else known
+
+
+def _with_findings(known: Known, journal: Decisions, done: list[dict[str, Any]]) -> Known:
+    found = Findings.from_json(journal.of("found")[-1])
+    written = [k for k, line in enumerate(done) if "left_out" in line]
+    since = done[written[-1] :] if written else []
+    seen = [line for line in since if "verified_um" in line]
+    unknown = [line for line in journal.of("found") if line["unexplained"]]
+    return replace(
+        known,
+        predicted_um=found.predicted_um,
+        ambiguous=tuple((a, b) for a, b in found.ambiguous),
+        unexplained=found.unexplained,
+        rounds_unknown=max(0, len(unknown) - 1) if found.unexplained else 0,
+        verified_um=seen[-1]["verified_um"] if seen else None,
+        at_most_um=seen[-1]["at_most_um"] if seen else None,
+        applied=bool(written) and done[written[-1]]["model"] == found.model,
+        corrections=len(written),
+    )
+
+
+def _declined(done: list[dict[str, Any]]) -> tuple[str, ...]:
+    """Grounds to which the person said no since the machine was measured the last time."""
+    grounds: list[str] = []
+    for line in reversed(done):
+        if "run" in line or "verified_um" in line:
+            break
+        if line.get(VETOED) and line.get("ground"):
+            grounds.append(line["ground"])
+    return tuple(reversed(grounds))
+
+
+def _ended(done: list[dict[str, Any]]) -> str:
+    """Why it is over: what a gate has refused is not asked again with the same readings."""
+    last = done[-1] if done else {}
+    if REFUSED in last:
+        return str(last[REFUSED])
+    # Journals without grounds: a no to anything but a pair was the end.
+    old = last.get(VETOED) and HOPELESS not in last and "ground" not in last
+    return "the operator said no" if old else ""
