@@ -1,13 +1,14 @@
 """Apply: what would be written, what the gates say, write and try, keep or put back, undo."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import Horizontal, Vertical
+from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.content import Content
 from textual.widgets import DataTable, Static
 
@@ -17,6 +18,8 @@ from app.tui.correction import Comparison
 from app.tui.dialogs import Choose, Pick
 from app.tui.face import Face
 from app.tui.picture import Picture
+from app.tui.widgets.tables import fill
+from app.writeback.proposal import Change
 from calib.digits import Digits, fixed
 
 
@@ -43,14 +46,17 @@ class ApplyFace(Face):
     def __init__(self) -> None:
         super().__init__()
         self._drawn: tuple[object, ...] | None = None
+        self._stages = 0
 
     def body(self) -> ComposeResult:
         """Changes to the left; gates, stages and snapshots to the right."""
         with Horizontal(id="apply"):
-            yield DataTable(id="apply-table", cursor_type="row", zebra_stripes=True, cell_padding=0)
+            yield DataTable(id="apply-table", cursor_type="row", zebra_stripes=True)
             with Vertical(id="apply-right"):
-                yield Static(id="apply-gates", classes="panel")
-                yield Static(id="apply-stages", classes="panel")
+                with VerticalScroll(id="apply-gates", classes="panel"):
+                    yield Static(id="apply-gates-text")
+                with VerticalScroll(id="apply-stages", classes="panel"):
+                    yield Static(id="apply-stages-text")
                 yield Static(id="apply-sets", classes="panel")
 
     def on_mount(self) -> None:
@@ -65,10 +71,14 @@ class ApplyFace(Face):
         """Draw table, gates and stages."""
         corrections = self.desk.corrections
         comparison = corrections.comparison
-        self.query_one("#apply-gates", Static).update(gates_text(picture.gates, self.wide))
-        stages = self.query_one("#apply-stages", Static)
+        gates = gates_text(picture.gates, wide=self.wide, brief=self.low and bool(picture.stages))
+        self.query_one("#apply-gates-text", Static).update(gates)
         left_out = comparison.proposal.left_out if comparison is not None else {}
-        stages.update(stages_text(picture, left_out, stages.content_size.height or 6))
+        self.query_one("#apply-stages-text", Static).update(stages_text(picture, left_out))
+        if len(picture.stages) != self._stages:
+            self._stages = len(picture.stages)
+            stages = self.query_one("#apply-stages", VerticalScroll)
+            self.call_after_refresh(stages.scroll_end, animate=False)
         self.query_one("#apply-sets", Static).update(sets_text(corrections.snapshots))
         drawn = (comparison, self.wide, self.desk.study.answer)
         if drawn != self._drawn:
@@ -76,30 +86,26 @@ class ApplyFace(Face):
             self._fill(comparison)
 
     def _fill(self, comparison: Comparison | None) -> None:
-        table = self.query_one("#apply-table", DataTable)
-        table.clear(columns=True)
+        table: DataTable[Text] = self.query_one("#apply-table", DataTable)
         table.border_subtitle = ""
         if comparison is None:
             fitted = self.desk.study.answer is not None
-            table.add_column("")
-            table.add_row("c compares the fit with the controller" if fitted
-                          else "Nothing is fitted yet: go to Fit (3)")  # fmt: skip
+            said = "c compares the fit with the controller"
+            fill(table, ("",), ((said if fitted else "Nothing is fitted yet: go to Fit (3)",),))
             return
-        names = ("old", "new", "change", "sigmas")
-        table.add_columns("name", *(Text(name, justify="right") for name in names))
-        for change in comparison.proposal.changes:
-            digits = Digits.of(change.sigma, change.old, change.new)
-            difference = digits.text(change.new - change.old, signed=True)
-            cells = (
-                f"{digits.text(change.old):>10}", f"{digits.text(change.new):>10}",
-                f"{difference:>8}", f"{fixed(change.in_sigmas, 1, signed=True):>7}",
-            )  # fmt: skip
-            style = "" if change.identified else "dim"
-            table.add_row(
-                Text(change.name, style), *(Text(cell, style, justify="right") for cell in cells)
-            )
-        count = len(comparison.proposal.changes)
-        table.border_subtitle = f"{count} values; a writes them"
+        changes = comparison.proposal.changes
+        old = ("old",) if self.wide else ()
+        site = self.desk.site
+        geometry = site.machine.parameter_index if site is not None else ()
+        rows = rows_of(grouped(changes, geometry), self.wide)
+        fill(
+            table,
+            ("name", *old, "new", "change", "sigmas"),
+            rows,
+            most=22,
+            gap=2 if self.wide else 1,
+        )
+        table.border_subtitle = f"{len(changes)} values, largest first; a writes them"
 
     # keys
 
@@ -165,23 +171,69 @@ class ApplyFace(Face):
         self.app.push_screen(Choose("Take as known?", text, choices, first="leave"), sure)
 
 
-def gates_text(gates: list[GateChecked], wide: bool) -> Content:
-    """Each gate with its value against its limit."""
+def grouped(changes: Sequence[Change], geometry: Collection[str]) -> dict[str, list[Change]]:
+    """The geometry (""), then effect by effect; in each the largest in its uncertainties first."""
+    groups: dict[str, list[Change]] = {}
+    for change in changes:
+        whose = "" if change.name in geometry else change.name.partition(".")[0]
+        groups.setdefault(whose, []).append(change)
+    return {whose: sorted(group, key=_by_size) for whose, group in groups.items()}
+
+
+def _by_size(change: Change) -> float:
+    """Largest first; one without an uncertainty before all others: nobody knows how large it is."""
+    return -abs(change.in_sigmas) if math.isfinite(change.in_sigmas) else -math.inf
+
+
+def rows_of(groups: Mapping[str, Sequence[Change]], wide: bool) -> list[list[Text]]:
+    """Cells of the changes, an effect's name above its own; what is not determined is dim."""
+    rows = []
+    for whose, group in groups.items():
+        if whose:
+            rows.append([Text(whose, "bold"), *(Text() for _ in range(4 if wide else 3))])
+        for change in group:
+            digits = Digits.of(change.sigma, change.old, change.new)
+            name = f" {change.name.removeprefix(f'{whose}.')}" if whose else change.name
+            cells = [name] + ([digits.text(change.old)] if wide else [])
+            cells += [digits.text(change.new), digits.text(change.new - change.old, signed=True)]
+            cells.append(fixed(change.in_sigmas, 1, signed=True))
+            rows.append([Text(cell, "" if change.identified else "dim") for cell in cells])
+    return rows
+
+
+def gates_text(gates: Sequence[GateChecked], *, wide: bool, brief: bool) -> Content:
+    """Each gate with its value against its limit, those that refuse first and with their reason.
+
+    ``brief``: gates that passed are only named, for what follows them needs the room.
+    """
     if not gates:
         return Content.from_markup("[dim]not asked yet[/]")
+    refused = [gate for gate in gates if not gate.passed]
+    passed = [gate for gate in gates if gate.passed]
     lines = []
-    for gate in gates:
-        sign, style = ("✓", "$success") if gate.passed else ("✗", "bold $error")
-        numbers = f"{gate.value:7.3g} ≤ {f'{gate.limit:g} {gate.unit}':<6}"
-        # The numbers stand first: they must be seen, however narrow the screen is.
-        words = gate.says.removeprefix(f"{gate.gate}: ").rpartition(": ")[0] if wide else ""
-        lines.append(
-            Content.assemble((f"{sign} ", style), f"{gate.gate:<11}{numbers} ", (words, "dim"))
-        )
+    for gate in refused:
+        lines.append(Content.assemble(("✗ ", "bold $error"), _numbers(gate)))
+        lines.append(Content(f"  {_reason(gate)}"))
+    if brief and passed:
+        names = ", ".join(gate.gate for gate in passed)
+        lines.append(Content.assemble(("✓ ", "$success"), f"passed: {names}"))
+        return Content("\n").join(lines)
+    for gate in passed:
+        reason = f" {_reason(gate)}" if wide else ""
+        lines.append(Content.assemble(("✓ ", "$success"), _numbers(gate), (reason, "dim")))
     return Content("\n").join(lines)
 
 
-def stages_text(picture: Picture, left_out: Mapping[str, str], most: int) -> Content:
+def _numbers(gate: GateChecked) -> str:
+    sign = "≤" if gate.passed else ">" if gate.value > gate.limit else "not ≤"
+    return f"{gate.gate:<11}{gate.value:7.3g} {sign} {f'{gate.limit:g} {gate.unit}':<6}"
+
+
+def _reason(gate: GateChecked) -> str:
+    return gate.says.removeprefix(f"{gate.gate}: ").rpartition(": ")[0]
+
+
+def stages_text(picture: Picture, left_out: Mapping[str, str]) -> Content:
     """The stages so far; the last one is the present one while the job runs."""
     if not picture.stages:
         lines = [Content.from_markup("[dim]nothing written[/]")]
@@ -196,7 +248,7 @@ def stages_text(picture: Picture, left_out: Mapping[str, str], most: int) -> Con
         sign = "✗" if bad else "▶" if last and picture.busy else "✓"
         style = "bold $error" if bad else "$accent" if sign == "▶" else "$success"
         lines.append(Content.assemble((f"{sign} ", style), stage.says))
-    return Content("\n").join(lines[-max(most, 3) :])
+    return Content("\n").join(lines)
 
 
 def sets_text(snapshots: tuple[Snapshot, ...]) -> Content:

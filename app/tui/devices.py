@@ -35,7 +35,7 @@ class DevicesFace(Face):
         "on this screen."
     )
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("o", "open_site", "Open site", tooltip="Choose or type the site file"),
+        Binding("o", "open_site", "Site", tooltip="Choose or type the site file"),
         Binding("m", "mock", "Mock", tooltip="Start a mock machine with its tracker"),
         Binding("c", "connect", "Connect", tooltip="Connect to the devices, or let them go"),
         Binding("e", "power", "Drives", tooltip="Switch the drives' power"),

@@ -1,6 +1,7 @@
 """Discover: which physical effect is missing; add it and watch the error fall."""
 
 import math
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rich.text import Text
@@ -16,10 +17,11 @@ from app.tui.dialogs import Pick
 from app.tui.face import Face
 from app.tui.picture import Picture
 from app.tui.widgets.plots import BinPlot
+from app.tui.widgets.tables import fill
 from app.tui.wording import p_text
 from calib.digits import plus_minus
 
-STAIRS = 4
+STAIRS, STAIRS_LOW = 4, 3
 """How many of the last steps are shown."""
 
 if TYPE_CHECKING:
@@ -36,7 +38,8 @@ class DiscoverFace(Face):
         "likely first; p pays for having looked at all of them. a adds the marked one, the model "
         "is fitted again and the staircase goes down one step, or the effect is refused because "
         "poses that the fit has not seen speak against it. x takes one out. g goes on by itself. "
-        "'Where it fails' says on what the residual depends; v shows the next one as a picture. "
+        "'Where it fails' says on what the residual depends; v shows the next one as a picture, "
+        "or, where there is no room for it, the sizes that are in the model. "
         "What is in the model here is used by Fit and Apply."
     )
     AUTO_FOCUS: ClassVar[str | None] = "#candidates"
@@ -46,7 +49,12 @@ class DiscoverFace(Face):
         Binding("a", "add", "Add", tooltip="Put the marked effect into the model"),
         Binding("x", "remove", "Remove", tooltip="Take an effect out of the model"),
         Binding("g", "go_on", "Go on", tooltip="Add by itself what is called for"),
-        Binding("v", "next", "View", tooltip="Show the next dependence"),
+        Binding(
+            "v",
+            "next",
+            "View",
+            tooltip="Show the next dependence; at 80 columns what is in the model",
+        ),
         Binding("s", "save", "Save", tooltip="Write the model to a file, for fit and apply"),
     ]
 
@@ -61,7 +69,8 @@ class DiscoverFace(Face):
             yield Static(id="stairs", classes="panel")
             yield Static(id="fails", classes="panel")
             yield BinPlot("", id="bins")
-        yield Static(id="advice", classes="panel")
+        with VerticalScroll(id="advice", classes="panel"):
+            yield Static(id="advice-text")
         with Vertical(id="discover-low"):
             yield DataTable(id="candidates", cursor_type="row", zebra_stripes=True)
             with VerticalScroll(id="found", classes="panel", can_focus=False):
@@ -79,13 +88,14 @@ class DiscoverFace(Face):
         """Draw everything, but only when the search has moved."""
         search = self.desk.study.search
         view = search.view if search is not None else None
-        drawn = (view, self._shown, self.wide)
+        drawn = (view, self._shown, self.wide, self.low)
         if drawn == self._drawn:
             return
         self._drawn = drawn
-        self.query_one("#stairs", Static).update(stairs_text(search, 12 if self.wide else 7))
+        stairs = stairs_text(search, 12 if self.wide else 7, STAIRS_LOW if self.low else STAIRS)
+        self.query_one("#stairs", Static).update(stairs)
         self.query_one("#fails", Static).update(fails_text(view, self._shown, self.wide))
-        self.query_one("#advice", Static).update(advice_text(view))
+        self.query_one("#advice-text", Static).update(advice_text(view))
         self.query_one("#found-text", Static).update(found_text(view))
         self._fill(view)
         if view is not None:
@@ -94,15 +104,19 @@ class DiscoverFace(Face):
                 self.query_one(BinPlot).show(structure[self._shown % len(structure)])
 
     def _fill(self, view: "View | None") -> None:
-        table = self.query_one("#candidates", DataTable)
-        table.clear(columns=True)
-        names = ("p", "RMS", "held out", "visible")
-        table.add_columns("effect", *(Text(n, justify="right") for n in names), "size")
-        if view is None:
-            return
-        for candidate in view.diagnosis["candidates"]:
-            table.add_row(*candidate_row(candidate), key=candidate["effect"])
-        table.border_subtitle = "RMS and held out: after adding, µm;  a adds"
+        table: DataTable[Text] = self.query_one("#candidates", DataTable)
+        table.border_subtitle = ""
+        candidates = view.diagnosis["candidates"] if view is not None else []
+        shapes = view.shapes if view is not None else frozenset()
+        visible = ("visible",) if self.wide else ()
+        heads = ("effect", "p", "RMS", "held out", *visible, "largest")
+        fill(
+            table, heads, [candidate_row(each, shapes, self.wide) for each in candidates],
+            keys=[each["effect"] for each in candidates], left=(0, len(heads) - 1), most=44,
+            gap=2 if self.wide else 1,
+        )  # fmt: skip
+        if candidates:
+            table.border_subtitle = "RMS and held out: after adding, µm;  a adds"
 
     # keys
 
@@ -157,18 +171,21 @@ class DiscoverFace(Face):
         self.act(lambda: self.desk.study.change("go on"), busy="adding what is called for ...")
 
     def action_next(self) -> None:
-        """Show the next dependence."""
-        self._shown += 1
-        self.draw()
+        """Show the next dependence; on a narrow screen what is in the model, and back."""
+        if self.wide:
+            self._shown += 1
+            self.draw()
+        else:
+            self.toggle_class("-model")
 
 
-def stairs_text(search: "Search | None", room: int) -> Content:
-    """The error after each step; a bar of ``room`` signs: noise, and what is left to explain."""
+def stairs_text(search: "Search | None", room: int, most: int) -> Content:
+    """The error after the last steps; a bar of ``room`` signs: noise, and what is left."""
     if search is None:
         return Content.from_markup(
             "[bold $accent]d[/] asks what the model of the\nchosen run misses"
         )
-    shown = search.stairs[-STAIRS:]
+    shown = search.stairs[-most:]
     top = max(stair.rms_um for stair in search.stairs)
     legend = " ░noise █left" if room > 10 else ""
     lines = [Content.from_markup("[dim]$head[/]", head=f"{'RMS':>20} held out{legend}")]
@@ -232,6 +249,8 @@ def advice_text(view: "View | None") -> Content:
     first = [(f"{said}\n", "$warning") for said in told]
     text = Content.assemble(*first, mark, diagnosis["advice"])
     for group in diagnosis["indistinguishable"]:
+        if all(name in diagnosis["advice"] for name in group):
+            continue  # the answer says so itself
         text = Content.assemble(text, ("  Cannot be told apart: ", "bold"), ", ".join(group), ".")
     return text
 
@@ -251,23 +270,28 @@ def found_text(view: "View | None") -> Content:
     return Content("\n").join(lines)
 
 
-def candidate_row(candidate: dict[str, Any]) -> list[Text]:
-    """Cells of one candidate."""
+def candidate_row(candidate: dict[str, Any], shapes: Collection[str], wide: bool) -> list[Text]:
+    """Cells of one candidate; the size is that of its largest unknown, by its name."""
     likely = candidate["p_value"] < 0.05
     style = "bold" if likely else "dim"
     held = candidate["holdout_rms_after_um"]
-    sizes = [
-        plus_minus(p["value"], p["sigma"], p["unit"], sign="±") for p in candidate["parameters"]
-    ]
-    more = f" (+{len(sizes) - 1})" if len(sizes) > 1 else ""
-    numbers = (
+    cells = [
+        ("! " if likely else "  ") + candidate["effect"],
         p_text(candidate["p_value"]),
         f"{candidate['rms_after_um']:.2f}" if candidate["rms_after_um"] is not None else "-",
         f"{held:.2f}" if held is not None else "-",
-        f"{100 * candidate['visible']:.0f} %",
-    )
-    return [
-        Text(("! " if likely else "  ") + candidate["effect"], style),
-        *(Text(number, style, justify="right") for number in numbers),
-        Text(sizes[0] + more if sizes and likely else "", style),
+        *([f"{100 * candidate['visible']:.0f} %"] if wide else []),
+        largest_text(candidate, shapes) if likely else "",
     ]
+    return [Text(cell, style) for cell in cells]
+
+
+def largest_text(candidate: dict[str, Any], shapes: Collection[str]) -> str:
+    """``leg4 -0.00042 ± 0.00018 mm/N (+5)``: the size that is most sigmas from zero."""
+    sizes = [p for p in candidate["parameters"] if p["name"] not in shapes]
+    if not sizes:
+        return ""
+    one = max(sizes, key=lambda p: abs(p["value"]) / p["sigma"] if p["sigma"] else 0.0)
+    name = one["name"].removeprefix(f"{candidate['effect']}.")
+    more = f" (+{len(sizes) - 1})" if len(sizes) > 1 else ""
+    return f"{name} {plus_minus(one['value'], one['sigma'], one['unit'], sign='±')}{more}"

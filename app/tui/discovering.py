@@ -41,6 +41,8 @@ class View:
     diagnosis: Mapping[str, Any]
     comparison: Mapping[str, Any]
     parameters: list[dict[str, Any]]
+    shapes: frozenset[str] = frozenset()
+    """Unknowns that are no sizes: periods, time constants, moments."""
 
 
 @dataclass(eq=False)
@@ -115,7 +117,14 @@ class Search:
         """Diagnose and compare the model where the staircase has come to."""
         run = self.refit(names).run
         comparison = compare_report(compare_fit(run.fit, np.random.default_rng(SEED)))
-        self.view = View(names, run, diagnosis_report(run), comparison, effect_parameters(run.fit))
+        shapes = frozenset(
+            unknown.name
+            for effect in self.refit.effects.values()
+            for unknown in effect.unknowns(self.refit.rows)
+            if unknown.nonlinear
+        )
+        found = effect_parameters(run.fit)
+        self.view = View(names, run, diagnosis_report(run), comparison, found, shapes)
 
 
 def _refused(name: str, before: float, after: float) -> BadInput:

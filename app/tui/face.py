@@ -72,6 +72,10 @@ class Face(Screen[None]):
         """Draw what was missed while another screen was shown."""
         self.draw()
 
+    def on_resize(self) -> None:
+        """Draw for the new size: what has room depends on it."""
+        self.call_after_refresh(self.draw)
+
     def _tick(self) -> None:
         if self.is_current and self._seen != self.desk.picture.revision:
             self.draw()

@@ -16,6 +16,7 @@ from app.tui.choosing import ask_for_model_file, choose_runs
 from app.tui.face import Face
 from app.tui.picture import Picture
 from app.tui.widgets.plots import PairPlot
+from app.tui.widgets.tables import fill
 from calib.digits import Digits, fixed
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ class FitFace(Face):
 
     def __init__(self) -> None:
         super().__init__()
-        self._drawn: FitAnswer | None = None
+        self._drawn: tuple[FitAnswer | None, bool] | None = None
 
     def body(self) -> ComposeResult:
         """Summary to the left, parameters to the right."""
@@ -66,9 +67,9 @@ class FitFace(Face):
         """Draw the answer; the table only when it is another one."""
         answer = self.desk.study.answer
         self.query_one("#fit-summary", Static).update(summary(answer, self.desk.study.runs))
-        if answer is self._drawn:
+        if (answer, self.wide) == self._drawn:
             return
-        self._drawn = answer
+        self._drawn = answer, self.wide
         self.query_one("#fit-words", Static).update(words(answer))
         if answer is not None:
             self._fill(answer)
@@ -81,19 +82,12 @@ class FitFace(Face):
                 id(answer),
             )
 
-    def on_resize(self) -> None:
-        """Columns depend on the width."""
-        if self._drawn is not None:
-            self._fill(self._drawn)
-
     def _fill(self, answer: "FitAnswer") -> None:
         table = self.query_one("#fit-table", DataTable)
-        table.clear(columns=True)
         value = ("value",) if self.wide else ()
-        names = (*value, "change", "±", "sigmas")
-        table.add_columns("parameter", *(Text(name, justify="right") for name in names), "")
+        heads = ("parameter", *value, "change", "±", "sigmas", "")
         rows = [parameter_row(entry, self.wide) for entry in answer.report["parameters"]]
-        table.add_rows(rows)
+        fill(table, heads, rows, left=(0, len(heads) - 1))
         known = sum(entry["identified"] for entry in answer.report["parameters"])
         table.border_subtitle = f"{known} of {len(rows)} determined; mm, rad"
 
@@ -201,8 +195,7 @@ def parameter_row(entry: dict[str, Any], wide: bool) -> list[Text]:
     cells += ["" if change is None else digits.text(change, signed=True)]
     cells += [digits.text(sigma), ratio]
     style = "" if entry["identified"] else "dim"
-    row = [Text(cells[0], style)]
-    row += [Text(cell, style, justify="right") for cell in cells[1:]]
+    row = [Text(cell, style) for cell in cells]
     return [*row, Text("" if entry["identified"] else "open", "#e8b45a")]
 
 

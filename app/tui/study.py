@@ -90,16 +90,19 @@ class Study:
 
         before = self.search.stairs if self.search is not None else []
 
-        def work() -> "Search":
+        def work() -> "tuple[Search, FitAnswer]":
+            from app.tui.analysis import answer_of
             from app.tui.discovering import Search
 
             found = Search.of(runs, effects, offers)
             if before:  # asked again: the way so far stands
                 found.stairs[:] = [*before, *(s for s in found.stairs[1:] if s not in before)]
-            return found
+            return found, answer_of(runs, found.present.run.fit)
 
-        self.search = await self._think(work)
-        self._tell_stair(self.search)
+        search, answer = await self._think(work)
+        self._take(answer)
+        self.search = search
+        self._tell_stair(search)
 
     async def change(self, what: Literal["add", "remove", "go on"], name: str = "") -> None:
         """Add or remove an effect, or go on by itself; the fit is then that of the new model."""

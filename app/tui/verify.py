@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
@@ -12,6 +11,7 @@ from textual.content import Content
 from textual.widgets import DataTable, Static
 
 from app.session.listing import facts_of
+from app.show.spans import duration
 from app.tui.dialogs import Choose, Enter, Pick
 from app.tui.face import Face
 from app.tui.picture import Picture
@@ -19,6 +19,7 @@ from app.tui.shelf import finished_verifications
 from app.tui.starting import session_words
 from app.tui.verifying import Verified
 from app.tui.widgets.plots import LogPairPlot
+from app.tui.widgets.tables import fill
 from app.verification import PAPER
 from calib.arrays import Array
 from calib.pose_error import Summary
@@ -67,7 +68,9 @@ class VerifyFace(Face):
     def show(self, picture: Picture) -> None:
         """Draw summary, table and plots; the latter only when there is news."""
         before, after = self.desk.before, self.desk.after
-        self.query_one("#verify-summary", Static).update(summary_text(before, after))
+        self.query_one("#verify-summary", Static).update(
+            summary_text(before, after, running_text(picture))
+        )
         drawn = (before, after, self._worst_first, self.wide)
         if drawn == self._drawn:
             return
@@ -79,13 +82,12 @@ class VerifyFace(Face):
 
     def _fill(self, before: Verified | None, after: Verified | None) -> None:
         table = self.query_one("#verify-table", DataTable)
-        table.clear(columns=True)
         shown = [v for v in (before, after) if v is not None]
         names = ["before µm", "after µm", "before mdeg", "after mdeg"]
         if len(shown) < 2:
             names = ["µm", "mdeg"]
-        table.add_columns("pose", *(Text(name, justify="right") for name in names))
         if not shown:
+            fill(table, ("pose", *names), ())
             return
         labels = list(shown[-1].found.labels)
         by_label = [dict(zip(v.found.labels, v.errors.T, strict=True)) for v in shown]
@@ -98,8 +100,8 @@ class VerifyFace(Face):
                 for which in (0, 1)
                 for one in by_label
             ]
-            rows.append([label, *(Text(cell, justify="right") for cell in cells)])
-        table.add_rows(rows)
+            rows.append([label, *cells])
+        fill(table, ("pose", *names), rows)
         table.border_subtitle = (
             f"{len(labels)} poses, {'worst first' if self._worst_first else 'in order of path'}"
         )
@@ -178,12 +180,29 @@ def aligned(
     }
 
 
-def summary_text(before: Verified | None, after: Verified | None) -> Content:
+def running_text(picture: Picture) -> str:
+    """How far a verification has come that runs now; empty if none does."""
+    if not picture.busy or picture.purpose != "verify":
+        return ""
+    done = picture.progress
+    if done is None:
+        return "a verification begins; 2 shows its steps"
+    left = f", {duration(done.remaining_s)} left" if done.remaining_s is not None else ""
+    return f"a verification runs: step {done.done} of {done.total}{left}; 2 shows its steps"
+
+
+def summary_text(before: Verified | None, after: Verified | None, running: str = "") -> Content:
     """Peaks and standard deviations, before and after, with what they can be compared to."""
     if before is None and after is None:
+        if running:
+            return Content.assemble(("▶ ", "$accent"), running)
         return Content.from_markup("[bold $accent]v[/] measures where the machine goes.")
     lines = [
-        Content.from_markup("[dim]                      peak µm   std µm     peak °     std °[/]")
+        Content.assemble(("▶ ", "$accent"), running)
+        if running
+        else Content.from_markup(
+            "[dim]                      peak µm   std µm     peak °     std °[/]"
+        )
     ]
     for when, verified in (("before", before), ("after", after)):
         if verified is None:

@@ -114,7 +114,7 @@ class WriteBack:
         held, proposal = await self.propose()
         snapshots = snapshots_of(self.station)
         snapshot = snapshots.save(held, f"before applying {Path(self.fit.source).name}")
-        self._stage("snapshot", f"{len(held.values)} parameters in {snapshots.path(snapshot)}")
+        self._stage("snapshot", f"{len(held.values)} parameters saved: {snapshots.path(snapshot)}")
         before = await self._measure("before", held.values)
         after = before
         wanted = Wanted(proposal.over(held.values), proposal.own)

@@ -18,6 +18,18 @@ MOST = 400
 Array = NDArray[np.float64]
 
 
+class Spaced(NumericAxisFormatter):
+    """Round numbers along an upright axis, no two on neighbouring lines: each is where it says."""
+
+    def __init__(self, plot: PlotWidget) -> None:
+        super().__init__()
+        self._plot = plot
+
+    def get_ticks(self, min_: float, max_: float, max_ticks: int = 8) -> list[float]:
+        """As many as the plot's lines allow."""
+        return few_ticks(min_, max_, max(2, min(max_ticks, self._plot.size.height // 2 - 2)))
+
+
 class QuietPlot(PlotWidget):
     """A plot that leaves the keys to the screen and has small margins."""
 
@@ -32,6 +44,7 @@ class QuietPlot(PlotWidget):
         self.margin_left = 6
         self.margin_bottom = 1
         self.margin_top = 0
+        self.set_y_formatter(Spaced(self))
 
     def changed(self, key: object) -> bool:
         """Whether what is to be drawn differs from what is drawn."""
