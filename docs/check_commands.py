@@ -212,9 +212,10 @@ class Shell:
 
 
 def pages() -> list[Path]:
-    """Every page that shows commands, in the order of their names."""
+    """Every page that shows commands, longest first, so that none is left over at the end."""
     everywhere = [CLONE / "README.md", *sorted((CLONE / "docs").rglob("*.md"))]
-    return [page for page in everywhere if steps_of(page.read_text(encoding="utf-8"))]
+    steps = {page: len(steps_of(page.read_text(encoding="utf-8"))) for page in everywhere}
+    return sorted((page for page in everywhere if steps[page]), key=lambda page: -steps[page])
 
 
 def main(arguments: list[str]) -> int:
