@@ -14,6 +14,7 @@ from typing import Any
 from calib.errors import BadInput
 from calib.plain_text import plain
 from calib.quantity import quantity
+from calib.toml_faults import Faults, some_number, some_numbers, standing_in
 from calib.toml_place import joined_names, keys_of, line_of, load_toml
 
 LARGEST = sys.float_info.max
@@ -52,6 +53,8 @@ class TomlTable:
         shown: tuple[str, ...] = (),
         asked: dict[str, Asked] | None = None,
         named: bool = False,
+        faults: Faults | None = None,
+        missing: BadInput | None = None,
     ) -> None:
         self._data = data
         self._text = text
@@ -60,13 +63,20 @@ class TomlTable:
         self._shown = shown
         self._named = named
         self._mine: set[str] = set()
+        self._missing = missing
+        self.faults = faults
         self.asked: dict[str, Asked] = {} if asked is None else asked
 
     @classmethod
-    def parse(cls, text: str, source: str) -> "TomlTable":
-        """The whole of a text; BadInput with its line where it is not valid TOML."""
+    def parse(cls, text: str, source: str, *, all_faults: bool = False) -> "TomlTable":
+        """The whole of a text; BadInput with its line where it is not valid TOML.
+
+        With ``all_faults`` reading goes on behind a fault, and who reads ends with
+        ``faults.end()``.
+        """
         text = plain(text)
-        return cls(load_toml(text, source), text, source)
+        faults = Faults(source) if all_faults else None
+        return cls(load_toml(text, source), text, source, faults=faults)
 
     def place(self, *keys: str | int) -> str:
         """File, line and key."""
@@ -78,13 +88,20 @@ class TomlTable:
         """What to raise for a fault at ``keys`` of this table."""
         return BadInput(what, place=self.place(*keys), remedy=remedy)
 
+    def complain(self, what: str, *keys: str | int, remedy: str = "") -> None:
+        """Raise a fault, or keep it where all are kept and go on."""
+        fault = self.wrong(what, *keys, remedy=remedy)
+        if self.faults is None:
+            raise fault
+        self.faults.add(fault)
+
     def only(self, *known: str) -> None:
         """Refuse keys other than ``known``."""
         for key in self._data:
             if key not in known:
                 near = difflib.get_close_matches(key, known, 1)
                 hint = f'Did you mean "{near[0]}"?' if near else f"Known: {', '.join(known)}"
-                raise self.wrong(f'unknown key "{key}"', key, remedy=hint)
+                self.complain(f'unknown key "{key}"', key, remedy=hint)
 
     def end(self) -> None:
         """Refuse keys that nobody asked for: most likely a typing error."""
@@ -141,17 +158,28 @@ class TomlTable:
             raise self.wrong(f"{key} is no list of tables", key, remedy=f"Write [[{key}]]")
         for index, entry in enumerate(value or ()):
             path, shown = (*self._path, key, index), self._shown_at(key)
-            yield TomlTable(entry, self._text, self._source, path, shown, self.asked)
+            yield TomlTable(
+                entry, self._text, self._source, path, shown, self.asked, faults=self.faults
+            )
 
     def _inside(self, key: str, required: bool, named: bool) -> "TomlTable":
-        value = self._get(key, Asked("table", "", required, None), f"[{key}]")
-        if value is None:
-            value = {}
-        if not isinstance(value, Mapping):
-            raise self.wrong(f"{key} is {value!r}, not a table", key, remedy=f"Write [{key}]")
+        missing: BadInput | None = None
+        value: Any = {}
+        try:
+            value = self._get(key, Asked("table", "", required, None), f"[{key}]") or {}
+            if not isinstance(value, Mapping):
+                raise self.wrong(f"{key} is {value!r}, not a table", key, remedy=f"Write [{key}]")
+        except BadInput as fault:
+            if self.faults is None:
+                raise
+            self.faults.add(fault)
+            missing, value = fault, {}
         path, shown = (*self._path, key), self._shown_at(key)
-        return TomlTable(value, self._text, self._source, path, shown, self.asked, named)
+        return TomlTable(
+            value, self._text, self._source, path, shown, self.asked, named, self.faults, missing
+        )
 
+    @standing_in(lambda key, default=None: default or "")
     def text(self, key: str, default: str | None = None) -> str:
         """Read a string."""
         value = self._get(key, Asked("text", "", default is None, default), f'{key} = "..."')
@@ -165,10 +193,17 @@ class TomlTable:
         """Read one of some words."""
         value = self.text(key, default)
         self.note(key, Asked(" or ".join(choices), "", default is None, default))
+        if self._missing is not None and default is None:
+            raise self._missing
         if value not in choices:
-            raise self.wrong(f"{key} is {value!r}", key, remedy=f"Expected {_either(choices)}")
+            remedy = f"Expected {_either(choices)}"
+            if default is None:
+                raise self.wrong(f"{key} is {value!r}", key, remedy=remedy)
+            self.complain(f"{key} is {value!r}", key, remedy=remedy)
+            return default
         return value
 
+    @standing_in(lambda key: [])
     def texts(self, key: str) -> list[str]:
         """Read a list of strings; empty where it is missing."""
         value = self._get(key, Asked("list of texts", "", False, None))
@@ -178,6 +213,7 @@ class TomlTable:
             raise self.wrong(f"{key} is {value!r}", key, remedy='Write ["...", "..."]')
         return list(value)
 
+    @standing_in(lambda key, default: default)
     def flag(self, key: str, default: bool) -> bool:
         """Read true or false."""
         value = self._get(key, Asked("true or false", "", False, default))
@@ -187,6 +223,7 @@ class TomlTable:
             raise self.wrong(f"{key} is {value!r}", key, remedy="Write true or false")
         return value
 
+    @standing_in(some_number)
     def number(
         self,
         key: str,
@@ -219,6 +256,7 @@ class TomlTable:
         self.note(key, Asked("number", unit, False, None))
         return value
 
+    @standing_in(lambda key, default=None, *, least=0, most=None: default or least)
     def whole(
         self, key: str, default: int | None = None, *, least: int = 0, most: int | None = None
     ) -> int:
@@ -234,6 +272,7 @@ class TomlTable:
             raise self.wrong(f"{key} is {value!r}", key, remedy=remedy)
         return int(value)
 
+    @standing_in(some_numbers)
     def numbers(
         self,
         key: str,
@@ -260,6 +299,7 @@ class TomlTable:
             raise self.wrong(f"{key} is {value!r}", key, remedy=remedy)
         return tuple(float(one) for one in value)
 
+    @standing_in(lambda key, unit, default=None, *, least=0.0, most=0.0: default or max(least, 0.0))
     def quantity(
         self,
         key: str,
@@ -276,6 +316,7 @@ class TomlTable:
             return float(default or 0.0)
         return self._within(key, quantity(value, unit, self.place(key)), least, most)
 
+    @standing_in(lambda key, length, unit, default=None, **bounds: default or (0.0,) * length)
     def quantities(
         self,
         key: str,
@@ -353,6 +394,8 @@ class TomlTable:
 
     def _get(self, key: str, asked: Asked, example: str = "") -> Any:
         self.note(key, asked)
+        if self._missing is not None and asked.required:
+            raise self._missing
         if key not in self._data and asked.required:
             near = difflib.get_close_matches(key, [k for k in self._data if k not in self._mine], 1)
             found = f' (there is "{near[0]}")' if near else ""

@@ -9,7 +9,7 @@ from drivers.kind import Kind, Setting
 
 
 def read_settings(
-    table: TomlTable, kind: Kind[Any], actuators: int, folder: Path
+    table: TomlTable, kind: Kind[Any], actuators: int | None, folder: Path
 ) -> dict[str, Any]:
     """Read every setting of a kind.
 
@@ -17,8 +17,8 @@ def read_settings(
     ----------
     table : TomlTable
         ``[controller]`` or ``[tracker]``.
-    actuators : int
-        How many the machine has.
+    actuators : int, optional
+        How many the machine has; None where it cannot be read: what hangs on it is not checked.
     folder : Path
         From which paths start.
 
@@ -33,16 +33,18 @@ def read_settings(
         table.note(setting.name, _asked(setting, actuators))
         complaint = setting.check(value) if setting.check is not None and value is not None else ""
         if complaint:
-            raise table.wrong(complaint, setting.name, remedy=setting.says)
+            table.complain(complaint, setting.name, remedy=setting.says)
     return values
 
 
-def _read(table: TomlTable, setting: Setting, actuators: int, folder: Path) -> Any:
+def _read(table: TomlTable, setting: Setting, actuators: int | None, folder: Path) -> Any:
     """One setting; its default where it is left out."""
     name = setting.name
     if not setting.required and not table.has(name):
         return setting.default
     count = actuators if setting.count == "actuators" else setting.count
+    if setting.count == "actuators" and actuators is None:
+        return table.raw(name)
     match setting.form:
         case "text":
             return table.choice(name, setting.choices) if setting.choices else table.text(name)
@@ -70,7 +72,7 @@ def _read(table: TomlTable, setting: Setting, actuators: int, folder: Path) -> A
             return _plain(table, name)
 
 
-def _asked(setting: Setting, actuators: int) -> Asked:
+def _asked(setting: Setting, actuators: int | None) -> Asked:
     """What the site file's page must say of a setting."""
     kind = " or ".join(setting.choices) or FORM_WORDS[setting.form]
     if setting.form == "numbers":
@@ -132,5 +134,6 @@ def read_address(table: TomlTable, key: str, default_port: int) -> tuple[str, in
     if not colon and default_port:
         return text, default_port
     if not host or not port.isdigit() or not 0 < int(port) < 65536:
-        raise table.wrong(f'{key} is "{text}"', key, remedy='Write "host:port"')
+        table.complain(f'{key} is "{text}"', key, remedy='Write "host:port"')
+        return "", 0
     return host, int(port)

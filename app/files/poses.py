@@ -17,6 +17,7 @@ from calib.mechanism.description import Machine
 from calib.mechanism.limits import violations
 from calib.poses.design import Design
 from calib.poses.reach import PoseSet, solve_poses
+from calib.toml_faults import Faults
 from calib.toml_table import TomlTable
 
 FORMAT = "pkm-poses/1"
@@ -70,11 +71,12 @@ def read_any_poses(path: Path, machine: Machine) -> dict[str, Pose]:
 
 def parse_pose_file(text: str, source: str, machine: Machine) -> PoseFile:
     """Check the text of a poses file."""
-    return pose_file_of(TomlTable.parse(text, source), source, machine)
+    return pose_file_of(TomlTable.parse(text, source, all_faults=True), source, machine)
 
 
 def pose_file_of(top: TomlTable, source: str, machine: Machine) -> PoseFile:
     """Check the tables of a poses file."""
+    faults = top.faults or Faults(source)
     top.format(FORMAT)
     name = top.text("machine", machine.name)
     if name != machine.name:
@@ -94,11 +96,13 @@ def pose_file_of(top: TomlTable, source: str, machine: Machine) -> PoseFile:
             "there is no pose", "poses", remedy='Write p01 = { x = 1.0, ..., rx = "2 deg" }'
         )
     if HOME in labels:
-        raise poses.wrong(f'no pose can be called "{HOME}"', HOME, remedy="Rename it")
+        poses.complain(f'no pose can be called "{HOME}"', HOME, remedy="Rename it")
     task = np.array([_coordinates(poses, label, machine) for label in labels]).T
+    faults.end()  # what stands in for a faulty coordinate is out of reach, or anywhere
     pose_set = solve_poses(machine, task)
     _check_reach(pose_set, labels, poses)
     _check_q(pose_set, labels, poses)
+    faults.end()
     return PoseFile(source, title, labels, pose_set, design)
 
 
@@ -109,7 +113,7 @@ def _coordinates(poses: TomlTable, label: str, machine: Machine) -> list[float]:
 
 
 def _check_reach(pose_set: PoseSet, labels: tuple[str, ...], poses: TomlTable) -> None:
-    for seen in violations(pose_set.machine, pose_set.configuration)[:1]:
+    for seen in violations(pose_set.machine, pose_set.configuration):
         label = labels[seen.pose]
         where = (
             f"{seen.what} would be {seen.value:.3f} {seen.unit}, its limits are {seen.low:g} to "
@@ -117,7 +121,7 @@ def _check_reach(pose_set: PoseSet, labels: tuple[str, ...], poses: TomlTable) -
             if seen.unit
             else seen.what
         )
-        raise poses.wrong(
+        poses.complain(
             f'pose "{label}" is out of reach: {where}',
             label,
             remedy="Leave it out, or move it inward",
@@ -130,7 +134,7 @@ def _check_q(pose_set: PoseSet, labels: tuple[str, ...], poses: TomlTable) -> No
         pose, own = poses.table(label), pose_set.q[:, k]
         given = np.array(pose.quantities("q", len(own), "", tuple(own)))
         if np.max(np.abs(given - own)) > Q_AGREES:
-            raise poses.wrong(
+            poses.complain(
                 f'q of pose "{label}" is not what the machine file gives '
                 f"({given[0]:g} against {own[0]:.4f}, ...)",
                 label,

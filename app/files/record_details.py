@@ -64,7 +64,7 @@ def record_details(table: TomlTable, folder: Path) -> RecordDetails:
         if text and name in FILES:
             text = str((folder / text).resolve())
             if not Path(text).is_file():
-                raise table.wrong(f"no file {text}", name, remedy="Give a path from this file")
+                table.complain(f"no file {text}", name, remedy="Give a path from this file")
         texts[name] = text
     table.end()
     return RecordDetails(**texts, **tolerances)  # type: ignore[arg-type]
@@ -74,6 +74,6 @@ def _check_day(table: TomlTable, name: str, text: str) -> None:
     try:
         date.fromisoformat(text)
     except ValueError:
-        raise table.wrong(
+        table.complain(
             f"{name} is {text!r}, no day", name, remedy='Write year-month-day: "2026-03-14"'
-        ) from None
+        )

@@ -19,6 +19,7 @@ from app.files.text import read_text
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.runs.header import Load, load_of
+from calib.toml_faults import Faults
 from calib.toml_table import TomlTable
 from drivers.kind import Takes
 
@@ -146,45 +147,58 @@ def load_site(path: Path) -> Site:
 
 
 def parse_site(text: str, source: str, folder: Path) -> Site:
-    """Check the text of a site file; paths in it start from ``folder``."""
-    return site_of(TomlTable.parse(text, source), source, folder)
+    """Check the text of a site file; paths in it start from ``folder``.
+
+    Raises
+    ------
+    BadInput
+        With every fault that can be told (:class:`calib.toml_faults.ManyFaults`).
+    """
+    return site_of(TomlTable.parse(text, source, all_faults=True), source, folder)
 
 
 def site_of(top: TomlTable, source: str, folder: Path) -> Site:
     """Check the tables of a site file."""
     top.format(FORMAT)
+    faults = top.faults or Faults(source)
+    attempt = faults.attempt
     machine_name = top.text("machine")
+    machine = attempt(lambda: _machine(top, machine_name, folder))
+    nests = top.table("nests")
+    platform, base = nests.named("platform"), nests.named("base")
+    platform_nests = {name: _centre(platform, name) for name in platform}
+    base_nests = {name: _centre(base, name) for name in base}
+    attempt(lambda: _check_nests(platform_nests, base_nests, base))
+    loaded = attempt(lambda: _load(top))
+    title = top.text("title", "")
+    # How many actuators there are is known only of a machine that can be read.
+    count = len(machine.actuators) if isinstance(machine, Machine) else None
+    controller = attempt(lambda: _controller(top.table("controller"), count, folder))
+    tracker = attempt(lambda: _tracker(top.table("tracker"), count, folder))
+    hands = attempt(lambda: _hands(top.table("hands", required=False)))
+    limits = attempt(lambda: _limits(top.table("limits", required=False)))
+    clock_scale = attempt(lambda: _clock(top.table("clock", required=False)))
+    offers = attempt(lambda: _offers(top.table("effects", required=False), folder))
+    record = attempt(lambda: record_details(top.table("record", required=False), folder))
+    nests.end()
+    top.end()
+    faults.end()
+    load, payload_kg = loaded
+    return Site(
+        source=source, data=_standing_alone(top, machine_name, folder), title=title,
+        machine_name=machine_name, machine=machine, controller=controller, tracker=tracker,
+        platform_nests=platform_nests, base_nests=base_nests, load=load, payload_kg=payload_kg,
+        hands=hands, limits=limits, clock_scale=clock_scale, offers=offers, record=record,
+    )  # fmt: skip
+
+
+def _machine(top: TomlTable, name: str, folder: Path) -> Machine:
     try:
-        machine = load_machine(machine_name, folder)
+        return load_machine(name, folder)
     except BadInput as error:
         if error.place:
             raise
         raise top.wrong(error.what, "machine", remedy=error.remedy) from None
-    nests = top.table("nests")
-    platform, base = nests.named("platform"), nests.named("base")
-    load, payload_kg = _load(top)
-    site = Site(
-        source=source,
-        data=_standing_alone(top, machine_name, folder),
-        title=top.text("title", ""),
-        machine_name=machine_name,
-        machine=machine,
-        controller=_controller(top.table("controller"), len(machine.actuators), folder),
-        tracker=_tracker(top.table("tracker"), len(machine.actuators), folder),
-        platform_nests={name: _centre(platform, name) for name in platform},
-        base_nests={name: _centre(base, name) for name in base},
-        load=load,
-        payload_kg=payload_kg,
-        hands=_hands(top.table("hands", required=False)),
-        limits=_limits(top.table("limits", required=False)),
-        clock_scale=_clock(top.table("clock", required=False)),
-        offers=_offers(top.table("effects", required=False), folder),
-        record=record_details(top.table("record", required=False), folder),
-    )
-    nests.end()
-    top.end()
-    _check_nests(site, base)
-    return site
 
 
 def _standing_alone(top: TomlTable, machine_name: str, folder: Path) -> dict[str, Any]:
@@ -227,20 +241,18 @@ def _centre(nests: TomlTable, name: str) -> tuple[float, ...]:
     return nests.numbers(name, 3, unit="mm", most=FARTHEST_MM)
 
 
-def _check_nests(site: Site, base: TomlTable) -> None:
-    if len(site.base_nests) < 3:
-        raise base.wrong(
-            f"{len(site.base_nests)} base nests", remedy="At least three tie tracker and base"
-        )
-    if len(site.platform_nests) < 1:
-        raise base.wrong("no platform nest", remedy="Give at least one in [nests.platform]")
-    both = set(site.base_nests) & set(site.platform_nests)
+def _check_nests(platform: Mapping[str, Any], base: Mapping[str, Any], table: TomlTable) -> None:
+    if len(base) < 3:
+        table.complain(f"{len(base)} base nests", remedy="At least three tie tracker and base")
+    if len(platform) < 1:
+        raise table.wrong("no platform nest", remedy="Give at least one in [nests.platform]")
+    both = set(base) & set(platform)
     if both:
         name = min(both)
-        raise base.wrong(f'nest "{name}" is on both', name, remedy="Give every nest its own name")
+        raise table.wrong(f'nest "{name}" is on both', name, remedy="Give every nest its own name")
 
 
-def _controller(table: TomlTable, actuators: int, folder: Path) -> ControllerSite:
+def _controller(table: TomlTable, actuators: int | None, folder: Path) -> ControllerSite:
     name = table.choice("kind", kind_names("controller"))
     kind = kind_named("controller", name)
     settings = read_settings(table, kind, actuators, folder)
@@ -249,7 +261,7 @@ def _controller(table: TomlTable, actuators: int, folder: Path) -> ControllerSit
     site = ControllerSite(name, serial, settings, address, kind.takes)
     if store := table.text("store", ""):
         if not site.hosted:
-            raise table.wrong(
+            table.complain(
                 f"a controller of the kind {name} keeps its parameters itself",
                 "store",
                 remedy="Leave store out",
@@ -259,7 +271,7 @@ def _controller(table: TomlTable, actuators: int, folder: Path) -> ControllerSit
     return site
 
 
-def _tracker(table: TomlTable, actuators: int, folder: Path) -> TrackerSite:
+def _tracker(table: TomlTable, actuators: int | None, folder: Path) -> TrackerSite:
     name = table.choice("kind", kind_names("tracker"))
     kind = kind_named("tracker", name)
     settings = read_settings(table, kind, actuators, folder)
@@ -299,7 +311,7 @@ def _limits(table: TomlTable) -> Limits:
             )
     low, high = values["air_temp_C"]
     if high - low <= LEAST_BAND_K:
-        raise table.wrong(
+        table.complain(
             f"air_temp_C is {low:g} to {high:g}: no air would ever be right",
             "air_temp_C",
             remedy=f"Write the lower limit first, the upper more than {LEAST_BAND_K:g} K above it",
@@ -340,7 +352,7 @@ def _load(top: TomlTable) -> tuple[Load | None, float | None]:
     table = top.table("load")
     load, payload_kg = load_of(table), table.optional_number("payload_kg", unit="kg")
     if payload_kg is not None and payload_kg < 0.0:
-        raise table.wrong(f"payload_kg is {payload_kg}", "payload_kg", remedy="Give its mass, kg")
+        table.complain(f"payload_kg is {payload_kg}", "payload_kg", remedy="Give its mass, kg")
     table.end()
     return load, payload_kg
 

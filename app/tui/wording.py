@@ -3,9 +3,14 @@
 from collections.abc import Mapping
 from typing import Any
 
+from calib.toml_faults import ManyFaults
+
 
 def said(error: Exception) -> tuple[str, str]:
     """Split an error of ours into what happened and what to do."""
+    if isinstance(error, ManyFaults):
+        count, *lines = error.what.splitlines()
+        return f"{error.place}: {count}", "; ".join(line.strip() for line in lines)
     what = str(getattr(error, "what", "") or error)
     device = str(getattr(error, "device", ""))
     place = str(getattr(error, "place", ""))
