@@ -64,6 +64,9 @@ _LABELS = {
     "nest table: one number 2 to 10 mm off": Mistake(
         labels.one_number_wrong, ("nest-displaced", "smr-size")
     ),
+    "nest table: one number 0.6 to 2 mm off": Mistake(
+        labels.one_number_wrong_by_little, ("nest-displaced",)
+    ),
     "nest table: one sign wrong": Mistake(labels.one_sign_wrong, ("nest-displaced",)),
     "base table: one number 1 to 10 mm off": Mistake(
         labels.base_number_wrong, ("nest-displaced", "nest-moved")
@@ -124,6 +127,7 @@ _COMMANDS = {
     "q rounded to 0.1": Mistake(units.q_rounded(0.1), ("q-rounded",), only=_LINEAR),
     "q rounded to 0.001 rad": Mistake(units.q_rounded(0.001), ("q-rounded",), only=("ptm",)),
     "one column of q stands": Mistake(motion.column_stands, refused="repeats"),
+    "q one row late": Mistake(motion.commands_late, ("rows-shifted",)),
     "one q of one pose mistyped": Mistake(motion.mistyped, ("pose-actuator", "excluded")),
     "one q of one row mistyped": Mistake(motion.mistyped_row, ("pose-label-shared", "excluded")),
     "the machine did not go to one pose": Mistake(

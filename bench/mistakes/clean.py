@@ -32,7 +32,7 @@ def machine_named(name: str) -> Machine:
 
 def clean_run(
     machine: str, seed: int, *, poses: int = 40, order: str = "nest-by-nest",
-    hidden: Mapping[str, float] | None = None, profile: Profile = PROFILE,
+    hidden: Mapping[str, float] | None = None, profile: Profile = PROFILE, noise_mm: float = 0.005,
 ) -> Run:  # fmt: skip
     """A simulated run, 5 um an axis, read back as a file is read."""
     plan = RunPlan(
@@ -42,6 +42,7 @@ def clean_run(
         order=order,  # type: ignore[arg-type]
         hidden=Hidden(dict(hidden or {})),
         profile=profile,
+        noise_mm=noise_mm,
     )
     return read_back(simulate(plan), machine)
 

@@ -137,6 +137,14 @@ def one_number_wrong(run: Run, chance: Chance) -> Run:
     return with_header(run, platform_nests=table)
 
 
+def one_number_wrong_by_little(run: Run, chance: Chance) -> Run:
+    """The first coordinate of one platform nest is off by 0.6 to 2 mm, across the nests' normal."""
+    name = str(chance.choice(list(run.header.platform_nests)))
+    off = np.array([chance.choice([-1.0, 1.0]) * chance.uniform(0.6, 2.0), 0.0, 0.0])
+    table = {**run.header.platform_nests, name: run.header.platform_nests[name] + off}
+    return with_header(run, platform_nests=table)
+
+
 def one_sign_wrong(run: Run, chance: Chance) -> Run:
     """One coordinate of one platform nest has the wrong sign."""
     table = dict(run.header.platform_nests)

@@ -179,6 +179,13 @@ def column_stands(run: Run, chance: Chance) -> Run:
     return replace(run, q=q)
 
 
+def commands_late(run: Run, chance: Chance) -> Run:
+    """Each q is that of the row before: the program logged the command before the last one."""
+    q = run.q.copy()
+    q[:, 1:] = run.q[:, :-1]
+    return replace(run, q=q)
+
+
 def controller_not_stated(run: Run, chance: Chance) -> Run:
     """The file states corrected parameters that the controller did not hold."""
     machine = machine_named(run.header.machine)

@@ -43,12 +43,16 @@ class Misread(BadInput):
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """One way in which a run may have been written: ``run`` reads it so."""
+    """One way in which a run may have been written: ``run`` reads it so.
+
+    ``resized``: in another unit of length.
+    """
 
     of: str
     says: str
     remedy: str
     run: Run
+    resized: bool = False
 
 
 def check_lengths(machine: Machine, run: Run) -> None:
@@ -145,9 +149,9 @@ def check_conventions(machine: Machine, given: Run, places: Places | None, than:
     more = 0 if places is None else max(now, than) + places.limit
     least = int(np.ceil(max(ENOUGH * few, more * few / count, LEAST_READINGS)))
     tried = _of_positions(run) if than else ways(machine, run)
-    best, most = _best(machine, tried, least)
+    best, most = _best(machine, _likely(given, tried), least)
     if best is None and not than:
-        best, most = _best(machine, _two_ways(run), least)
+        best, most = _best(machine, _likely(given, _two_ways(run)), least)
     if best is None:
         return
     raise Misread(
@@ -157,6 +161,17 @@ def check_conventions(machine: Machine, given: Run, places: Places | None, than:
         place=run.source,
         remedy=best.remedy,
     )
+
+
+def _likely(run: Run, tried: Iterator[Way]) -> Iterator[Way]:
+    """Ways without those of a unit of length, where the distances between nests are right as read.
+
+    Nests that are all in one point fit many readings of a machine that has wide tolerances.
+    """
+    known = [_stretch(run, run.header.platform_nests, run.pose)]
+    known.append(_stretch(run, run.header.base_nests, None))
+    right = [one for one in known if one and _is(one, 1.0)]
+    return (way for way in tried if not (way.resized and right))
 
 
 def _thinned(run: Run) -> Run:
@@ -199,6 +214,7 @@ def _of_positions(run: Run) -> Iterator[Way]:
             f"x, y, z look like {unit}, not mm",
             f"Write x, y, z in mm (these numbers times {factor:g}), and their sigmas too",
             replace(run, position=factor * run.position),
+            resized=True,
         )
     flip = np.array([[1.0], [1.0], [-1.0]])
     yield Way(
@@ -225,6 +241,7 @@ def _of_nests(run: Run) -> Iterator[Way]:
                 f"[{key}] looks like {unit}, not mm",
                 f"Write the nests in mm (these numbers times {factor:g})",
                 replace(run, header=other),
+                resized=True,
             )
 
 
@@ -288,4 +305,5 @@ def _two_ways(run: Run) -> Iterator[Way]:
             second,
             says=f"{first.says}; and {mirrored.says}",
             remedy=f"{first.remedy}. {mirrored.remedy}",
+            resized=True,
         )

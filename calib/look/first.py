@@ -25,6 +25,7 @@ from calib.look.repeats import no_measurements
 from calib.look.seats import displaced_seat
 from calib.look.sigmas import sigmas
 from calib.look.slid import check_columns, slid_rows
+from calib.look.slid_commands import slid_commands
 from calib.look.tables import turned_table
 from calib.look.temperatures import temperatures
 from calib.look.travel import check_travel
@@ -120,8 +121,10 @@ def rows_alone(machine: Machine, run: Run) -> tuple[Run, list[Remark]]:
     remarks += found
     looked, found = sigmas(looked)
     remarks += found
-    looked, found = pose_labels(machine, looked)
-    return looked, [*remarks, *found]
+    for ask in (slid_commands, pose_labels):
+        looked, found = ask(machine, looked)
+        remarks += found
+    return looked, remarks
 
 
 def _places(machine: Machine, run: Run) -> tuple[list[Run], list[Remark], _Known]:

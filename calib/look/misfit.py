@@ -41,8 +41,12 @@ CLEAR = 30.0
 """Fall of chi-square by which it must beat what else could step at that moment."""
 LEAST = 3
 """Readings on either side of a step."""
-SMALLEST_SEAT = 0.3
-"""Offset of a nest, mm, below which it is a matter of the effect nest-offset."""
+SMALLEST_SEAT, SMALLEST_ASIDE = 0.3, 0.5
+"""Offset of a nest, mm, below which it is a matter of the effect nest-offset; and off its normal.
+
+No reflector makes an offset that is not along the normal: there it must be larger, and explain all.
+"""
+ASIDE_SHARE = 0.97
 LOUDEST = 100.0
 """Chi-square per degree of freedom that physics may leave where the unit is right."""
 _Known = Mapping[str, Array]
@@ -126,7 +130,7 @@ class _Seat:
 
 
 def _seat(fitted: Fit) -> _Seat | None:
-    """The nest whose offset along the normal, in the whole run or a part, explains the misfit."""
+    """The nest whose offset, in the whole run or a part, explains the misfit."""
     rows = fitted.model.rows
     header = rows.runs[0].header
     names = np.array(rows.nest_name, dtype=object)
@@ -150,15 +154,20 @@ def _seat(fitted: Fit) -> _Seat | None:
             which[kept[edge]] = True
             if edge == whole:
                 which = named
-            size = float(np.linalg.norm(tries.sizes[edge]))
-            if size < SMALLEST_SEAT or abs(normal @ tries.sizes[edge]) < ALONG * size:
-                continue
             found = _Seat(name, room, which, tries.sizes[edge], float(tries.fall[edge]))
+            if not _seems_moved(found, normal, excess(fitted)):
+                continue
             if best is None or found.fall > best.fall:
                 best = found
-    if best is None or best.fall < max(FALL, SEAT_SHARE * excess(fitted)):
-        return None
     return best
+
+
+def _seems_moved(seat: _Seat, normal: Array, misfit: float) -> bool:
+    """Whether an offset is large enough, and explains enough of a misfit, to be of the record."""
+    size = float(np.linalg.norm(seat.offset))
+    along = abs(float(normal @ seat.offset)) >= ALONG * size
+    least, share = (SMALLEST_SEAT, SEAT_SHARE) if along else (SMALLEST_ASIDE, ASIDE_SHARE)
+    return size >= least and seat.fall >= max(FALL, share * misfit)
 
 
 def _seat_columns(fitted: Fit, which: BoolArray, *, room: bool) -> Array:

@@ -21,7 +21,13 @@ def pose_labels(machine: Machine, run: Run) -> tuple[Run, list[Remark]]:
     return run, [*shared, *_sorted_rows(run)]
 
 
-def _shared(machine: Machine, run: Run) -> tuple[Run, list[Remark]]:
+def shared_labels(machine: Machine, run: Run) -> dict[str, int]:
+    """Labels that stand for more than one command, each with the line that shows it."""
+    return _poses_apart(machine, run)[1]
+
+
+def _poses_apart(machine: Machine, run: Run) -> tuple[list[str], dict[str, int], list[int]]:
+    """Names of poses that are poses of their own, the labels that they share, and their lines."""
     travel = np.ptp(machine.q_limits, axis=1)
     travel = np.where(np.isfinite(travel), travel, np.inf)[:, None]
     names: list[str] = list(run.pose)
@@ -41,6 +47,11 @@ def _shared(machine: Machine, run: Run) -> tuple[Run, list[Remark]]:
             names[row] = f"{label} ({near[0] + 1})"
             lines.append(int(run.line[row]))
             shared.setdefault(label, int(run.line[row]))
+    return names, shared, lines
+
+
+def _shared(machine: Machine, run: Run) -> tuple[Run, list[Remark]]:
+    names, shared, lines = _poses_apart(machine, run)
     if not shared:
         return run, []
     named = ", ".join(list(shared)[:4]) + (" ..." if len(shared) > 4 else "")

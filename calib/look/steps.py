@@ -28,6 +28,8 @@ class FrameStep:
     row: int
     values: Array
     fall: float
+    or_tool: bool = False
+    """Whether the nests on the platform, moved as one, would explain it as well."""
 
 
 def frame_step(fitted: Fit) -> FrameStep | None:
@@ -48,14 +50,17 @@ def frame_step(fitted: Fit) -> FrameStep | None:
     turned = np.stack([rotate(situation.rotation, one) for one in tool])
     others.append(np.einsum("ijn,kjn->kin", situation.whitened_frame, turned))
     rivals = [scan(fitted, one[:, :, fitted.accepted]).fall[inner].max() for one in others]
+    by_tool = float(rivals.pop())
     drift = rigid_motions(situation.point) * rows.progress
     slow = np.einsum("ijn,kjn->kin", situation.whitener, drift)[:, :, fitted.accepted]
     rivals.append(scan(fitted, slow).fall[0])
-    if best < max(rivals) + CLEAR:
+    if best < max(max(rivals) + CLEAR, by_tool - CLEAR):
         return None
     row = int(kept[at])
     moment = 0.5 * (rows.moment[kept[at - 1]] + rows.moment[row])
-    return FrameStep(row, np.concatenate([base.sizes[at], [moment, 1.0]]), best)
+    return FrameStep(
+        row, np.concatenate([base.sizes[at], [moment, 1.0]]), best, best < by_tool + CLEAR
+    )
 
 
 def step_remark(fitted: Fit, found: FrameStep) -> Remark:
@@ -65,9 +70,14 @@ def step_remark(fitted: Fit, found: FrameStep) -> Remark:
     moved = np.tensordot(found.values[:6], rigid_motions(middle), axes=1)
     size = float(np.linalg.norm(moved))
     told = f"{size:.3g} mm" if size >= 1.0 else f"{1000 * size:.0f} um"
+    moved_by = (
+        "The tracker, the base or all nests on the platform were moved"
+        if found.or_tool
+        else "The tracker or the base was moved"
+    )
     return Remark(
         "station-moved",
-        f"The tracker or the base was moved during the run: by {told} before line "
+        f"{moved_by} during the run: by {told} before line "
         f"{rows.line[found.row]} ({rows.time_s[found.row]:.0f} s)",
         ranges(rows.line[found.row :], rows.line),
         f"One step of the frame explains "
