@@ -2,14 +2,14 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import click
 
 from app import answer
-from app.files.machines import load_machine
-from calib.mechanism.description import Machine
-from calib.mechanism.variants import with_closure
+
+if TYPE_CHECKING:
+    from calib.mechanism.description import Machine
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -103,8 +103,11 @@ def machine_options(function: _Function) -> _Function:
     return click.argument("machine_name", metavar="MACHINE")(function)
 
 
-def chosen_machine(machine_name: str, closure: str) -> Machine:
+def chosen_machine(machine_name: str, closure: str) -> "Machine":
     """The machine that was named, closed as asked for."""
+    from app.files.machines import load_machine
+    from calib.mechanism.variants import with_closure
+
     machine = load_machine(machine_name)
     return with_closure(machine, closure) if closure else machine
 

@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import click
-from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from app.plain_data import plain
 from app.written import writable
@@ -69,6 +67,12 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 @contextmanager
 def working(text: str) -> Iterator[None]:
     """Show that something takes its time, and for how long, while a person looks on."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
     console = Console(stderr=True)
     columns = (SpinnerColumn(), TextColumn(text, markup=False), BarColumn(24), TimeElapsedColumn())
     with Progress(

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from app.defaults import REFERENCE_EVERY
 from app.files.pose_table import Pose
 from app.files.site import Site, load_site
 from app.files.text import read_text
@@ -40,8 +41,6 @@ from calib.pose_error import (
 )
 
 FORMAT = "pkm-verification/1"
-REFERENCE_EVERY = 40
-"""Poses between two looks at the base nests."""
 COVERAGE = 2.0
 """Coverage factor of expanded uncertainties: about 95 %."""
 AXES = ("x", "y", "z", "rx", "ry", "rz")

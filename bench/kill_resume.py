@@ -18,8 +18,9 @@ from pathlib import Path
 
 from app.files.pose_table import poses_text
 from app.files.runs import read_run
-from app.session.folder import JOURNAL, read_folder
+from app.session.folder import read_folder
 from app.session.journal import Journal
+from app.session.within import JOURNAL
 
 POSES = {
     "a": (5.0, 0.0, 222.0, 0.05, 0.0, 0.1),

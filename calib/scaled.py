@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg
 
 from calib.arrays import Array
 
@@ -51,8 +50,8 @@ class Scaled:
     def solve(self, slope: Array, damping: float = 0.0) -> Array:
         """N^-1 slope (p,); ``damping`` joins the unit diagonal."""
         damped = self.matrix + damping * np.eye(self.scale.size) if damping else self.matrix
-        factor = linalg.cho_factor(damped, lower=True)
-        return np.asarray(self.scale * linalg.cho_solve(factor, self.scale * slope))
+        np.linalg.cholesky(damped)  # says if it is not positive definite
+        return np.asarray(self.scale * np.linalg.solve(damped, self.scale * slope))
 
     def inverse(self) -> Array:
         """N^-1 (p, p)."""
@@ -61,9 +60,9 @@ class Scaled:
     def half_solved(self, columns: Array) -> Array:
         """L^-1 S columns, (p,) or (p, m)."""
         scaled = (columns.T * self.scale).T
-        return np.asarray(linalg.solve_triangular(self.factor, scaled, lower=True))
+        return np.asarray(np.linalg.solve(self.factor, scaled))
 
     @cached_property
     def factor(self) -> Array:
         """L (p, p), lower triangular."""
-        return np.asarray(linalg.cholesky(self.matrix, lower=True))
+        return np.asarray(np.linalg.cholesky(self.matrix))

@@ -9,6 +9,7 @@ from typing import Any, Literal, Self
 
 from app.auto.flight import Flight, folder_of, limits_of
 from app.auto.station import StationLaboratory
+from app.defaults import REFERENCE_EVERY
 from app.errors import GateRefused, StoppedByOperator
 from app.files.fits import read_fit
 from app.files.pose_table import Pose
@@ -34,10 +35,9 @@ from app.jobs.verifying import (
     read_before,
     verification_report,
 )
-from app.session import Outcome, Session
-from app.session import Station as Connection
 from app.session.events import Event, PromptNeeded
-from app.verification import REFERENCE_EVERY
+from app.session.session import Outcome, Session
+from app.session.station import Station as Connection
 from app.writeback.gates import Gates
 from app.writeback.procedure import WriteBack
 from app.writeback.proposal import Proposal

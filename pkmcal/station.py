@@ -7,6 +7,7 @@ from concurrent import futures
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
+from app.defaults import REFERENCE_EVERY
 from app.files.pose_table import Pose
 from app.files.site import Site
 from app.jobs.applying import AcceptReport, ApplyReport, SetsReport, UndoReport
@@ -15,7 +16,6 @@ from app.jobs.chosen_runs import File
 from app.jobs.measuring import SessionReport
 from app.jobs.verifying import VerificationReport
 from app.session.events import Event
-from app.verification import REFERENCE_EVERY
 from pkmcal.async_station import AsyncStation, Operator, Order
 
 _Answer = TypeVar("_Answer")

@@ -12,11 +12,10 @@ from app.auto.journal import NAME
 from app.auto.policy import Limits
 from app.auto.report import report_of
 from app.auto.station import StationLaboratory
+from app.defaults import FEWEST_FIRST, MOST_FIRST
 from app.errors import StoppedByOperator
 from app.jobs.automatic import AutoReport
 from calib.errors import BadInput
-
-FEWEST_FIRST, MOST_FIRST = 6, 60
 
 
 def limits_of(

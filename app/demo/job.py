@@ -15,13 +15,14 @@ from app.files.pose_table import Pose
 from app.files.poses import full_poses, nest_matrix, render_design
 from app.files.site import Site, load_site
 from app.report.build import Asked, write_report
-from app.session import PlanOptions, Session, measure_plan
 from app.session import events as ev
-from app.session.plans import order_for
+from app.session.plans import PlanOptions, measure_plan, order_for
+from app.session.session import Session
 from app.session.station import Station
 from app.verification import Verification, judge_session, verification_plan
 from app.writeback.gates import Gates
 from app.writeback.procedure import WriteBack
+from calib.defaults import POSES_FROM
 from calib.identify import fit
 from calib.model import Model
 from calib.poses import verification_poses
@@ -38,7 +39,6 @@ STEPS = (
     ("report", "report: the calibration record"),
 )
 READING_SIGMA_MM = 0.004
-CANDIDATES = 2500
 
 
 @dataclass(frozen=True)
@@ -154,14 +154,14 @@ class Demo:
             np.random.default_rng(self.seed),
             criterion="I",
             priors=True,
-            candidates=CANDIDATES,
+            candidates=POSES_FROM,
             counts=[self.count],
         )
         text = render_design(design, self.seed, f"pkmcal demo --poses {self.count}")
         (self.folder / "poses.toml").write_text(text, encoding="utf-8")
         self.watcher.ends(
             "poses",
-            f"{self.count} of {CANDIDATES} reachable poses; predicted "
+            f"{self.count} of {POSES_FROM} reachable poses; predicted "
             f"{design.accuracy.position_um:.1f} um RMS at fresh ones",
         )
         return full_poses(design.labels, design.pose_set)

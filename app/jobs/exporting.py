@@ -14,6 +14,7 @@ import jinja2
 import tomli_w
 from jinja2.sandbox import SandboxedEnvironment
 
+from app.defaults import PLAIN, TEMPLATES
 from app.files.fits import SavedFit, read_fit
 from app.files.text import read_text
 from app.hosted.parameters import effect_of
@@ -28,8 +29,6 @@ from drivers.errors import DeviceError
 from drivers.kind import Strut
 from drivers.linuxcnc.places import Places
 
-SHIPPED = ("csv", "gcode-delta", "hal", "p-variables")
-PLAIN = ("json", "toml", "urdf")
 FORMAT = "pkm-export/1"
 LONGEST_TEMPLATE = 100_000
 
@@ -149,7 +148,7 @@ def export(model: File, form: str, *, machine: str | None = None) -> str:
             "left_out": list(found.left_out),
         }
         return json.dumps(table, indent=1) + "\n" if form == "json" else tomli_w.dumps(table)
-    if form in SHIPPED:
+    if form in TEMPLATES:
         source = files("app.templates").joinpath(f"export-{form}.j2").read_text(encoding="utf-8")
         return rendered(source, found, form)
     path = Path(form)
@@ -157,7 +156,7 @@ def export(model: File, form: str, *, machine: str | None = None) -> str:
         raise BadInput(
             f'there is no form "{form}"',
             place="--as",
-            remedy=f"Write one of {', '.join((*PLAIN, *SHIPPED))}, or a template's path (.j2)",
+            remedy=f"Write one of {', '.join((*PLAIN, *TEMPLATES))}, or a template's path (.j2)",
         )
     return rendered(read_text(path), found, form)
 

@@ -14,7 +14,8 @@ from app.files.runs import outside_runs
 from app.jobs.chosen_runs import File, Runs, at_least, names_of, path_of, paths_of
 from app.jobs.posing import PoseEntry
 from app.jobs.record import Report
-from calib.discover.design import CANDIDATES, FollowUpPlan, design_follow_up
+from calib.defaults import FOLLOW_UP_FROM
+from calib.discover.design import FollowUpPlan, design_follow_up
 from calib.effects import effect_named
 from calib.errors import BadInput
 from calib.poses.design import labels_for
@@ -66,7 +67,7 @@ def design(
     add: Sequence[str] = (),
     model: File | None = None,
     offer: Sequence[File] = (),
-    candidates: int = CANDIDATES,
+    candidates: int = FOLLOW_UP_FROM,
     seed: int = 1,
     watch: Callable[[str], None] | None = None,
 ) -> FollowUpReport:
@@ -191,7 +192,7 @@ def _poses_file(plan: FollowUpPlan, report: FollowUpReport, again: Mapping[str, 
         command += f" --model {os.fspath(again['model'])}"
     command += "".join(f" --add {name}" for name in again["add"])
     command += "".join(f" --offer {os.fspath(file)}" for file in again["offer"])
-    if again["candidates"] != CANDIDATES:
+    if again["candidates"] != FOLLOW_UP_FROM:
         command += f" --candidates {again['candidates']}"
     command += f" --n {plan.poses.count} --seed {again['seed']}"
     title = f"{plan.poses.count} poses that tell {first} from {second}"

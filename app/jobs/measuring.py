@@ -11,9 +11,9 @@ from app.files.poses import read_any_poses
 from app.files.site import Site
 from app.jobs.chosen_runs import File, path_of
 from app.jobs.record import Report
-from app.session import Outcome, PlanOptions, Session, measure_plan
 from app.session.folder import latest_session
-from app.session.plans import Order, order_for
+from app.session.plans import Order, PlanOptions, measure_plan, order_for
+from app.session.session import Outcome, Session
 from app.session.station import Station
 
 

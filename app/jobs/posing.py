@@ -14,10 +14,11 @@ from app.files.poses import full_poses, nest_matrix, render_design, render_pose_
 from app.files.site import Limits, Site, load_site
 from app.jobs.chosen_runs import File, at_least
 from app.jobs.record import Record, Report
+from calib.defaults import POSES_FROM
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.limits import Margin
-from calib.poses.design import CANDIDATES, TABLE, Design, design_poses
+from calib.poses.design import TABLE, Design, design_poses
 from calib.poses.information import Accuracy
 from calib.poses.margin import stroke_margin
 from calib.poses.readings import HAN_2020, DirectionReadings, NestReadings, PoseNoise, Readings
@@ -149,7 +150,7 @@ def choose_poses(
     heights: bool = False,
     sigma_um: float | None = None,
     angle_mdeg: float | None = None,
-    candidates: int = CANDIDATES,
+    candidates: int = POSES_FROM,
     seed: int = 1,
     margin_mm: float | None = None,
 ) -> PosesReport:

@@ -3,10 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from app.history.store import Entry, History, now_utc
-from app.session.listing import sessions_under
-from app.session.taken import session_of, taken_in
-from app.verification import judge_session
+from app.session.within import session_of
 from calib.errors import BadInput
 from calib.identify import Fit, fit_report
 
@@ -19,6 +16,9 @@ def remember_fit(fit: Fit, runs: Sequence[str]) -> None:
     sessions = [session for session in map(session_of, runs) if session is not None]
     if not sessions:
         return
+    from app.history.store import Entry, History, now_utc
+    from app.session.taken import taken_in
+
     header = fit.model.rows.runs[-1].header
     used = header.compensation
     report = fit_report(fit)
@@ -46,6 +46,10 @@ def remember_fit(fit: Fit, runs: Sequence[str]) -> None:
 
 def remember_verifications(root: Path) -> None:
     """Enter the finished verifications of a folder that are not in the history yet."""
+    from app.history.store import Entry, History
+    from app.session.listing import sessions_under
+    from app.verification import judge_session
+
     history = History(root)
     known = {entry.source for entry in history.entries("verification")}
     for facts in sessions_under(root):

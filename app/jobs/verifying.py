@@ -6,17 +6,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from app.defaults import REFERENCE_EVERY
 from app.files.pose_table import Pose
 from app.files.site import Site
 from app.files.text import read_text
 from app.jobs.chosen_runs import File
 from app.jobs.measuring import read_if_file
 from app.jobs.record import Record, Report
-from app.session import Session
-from app.session.folder import JOURNAL
 from app.session.journal import Journal
+from app.session.session import Session
 from app.session.station import Station
-from app.verification import FORMAT, REFERENCE_EVERY, judge_session, verification_plan
+from app.session.within import JOURNAL
+from app.verification import FORMAT, judge_session, verification_plan
 from app.written import writable
 from calib.errors import BadInput
 from calib.poses import verification_poses

@@ -2,30 +2,31 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 
-from app.machine_templates.arm import arm_file
-from app.machine_templates.common import Questions
-from app.machine_templates.delta import delta_file
-from app.machine_templates.hexapod import hexapod_file
-from app.machine_templates.linuxcnc import linuxcnc_file
-from app.machine_templates.own import own_file
+from app.machine_templates.questions import Questions
 
 
 @dataclass(frozen=True)
 class Template:
-    """A kind of machine: what it is, and the text that answers make of it."""
+    """A kind of machine and what it is; the module of its name, loaded when asked, writes it."""
 
     name: str
     says: str
-    render: Callable[[str, Questions], str]
+
+    def render(self, name: str, ask: Questions) -> str:
+        """The text of a machine file of that name, from what the answers say."""
+        home = import_module(f"app.machine_templates.{self.name}")
+        written: Callable[[str, Questions], str] = getattr(home, f"{self.name}_file")
+        return written(name, ask)
 
 
 TEMPLATES: Sequence[Template] = (
-    Template("hexapod", "six legs that grow (6-UPS, a Stewart platform)", hexapod_file),
-    Template("delta", "three carriages on towers with two rods each", delta_file),
-    Template("arm", "a serial arm with six axes", arm_file),
-    Template("linuxcnc", "six struts as LinuxCNC's genhexkins has them", linuxcnc_file),
-    Template("own", "equal limbs around a circle, with joints of your own", own_file),
+    Template("hexapod", "six legs that grow (6-UPS, a Stewart platform)"),
+    Template("delta", "three carriages on towers with two rods each"),
+    Template("arm", "a serial arm with six axes"),
+    Template("linuxcnc", "six struts as LinuxCNC's genhexkins has them"),
+    Template("own", "equal limbs around a circle, with joints of your own"),
 )
 
 __all__ = ["TEMPLATES", "Questions", "Template"]

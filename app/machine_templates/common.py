@@ -1,20 +1,8 @@
 """What the templates of machine files have in common."""
 
-from typing import Protocol
-
 import numpy as np
 
 from calib.arrays import Array
-
-
-class Questions(Protocol):
-    """Who answers: a person at the terminal, or values given beforehand."""
-
-    def number(self, name: str, question: str, default: float) -> float:
-        """Ask for a number."""
-
-    def text(self, name: str, question: str, default: str) -> str:
-        """Ask for a text."""
 
 
 def head(name: str, says: str) -> str:

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from app.machine_templates.common import Questions, head, join_parts, parameter
+from app.machine_templates.common import head, join_parts, parameter
+from app.machine_templates.questions import Questions
 
 
 def delta_file(name: str, ask: Questions) -> str:

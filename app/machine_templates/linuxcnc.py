@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.machine_templates.common import Questions, head, join_parts, on_circle
+from app.machine_templates.common import head, join_parts, on_circle
+from app.machine_templates.questions import Questions
 from calib.arrays import Array
 from calib.errors import BadInput
 from drivers.errors import DeviceError

@@ -25,7 +25,8 @@ from app.report.sources import (
     site_of_session,
     verifications_beside,
 )
-from app.session.taken import Taken, session_of, spans, taken_in
+from app.session.taken import Taken, spans, taken_in
+from app.session.within import session_of
 from calib.errors import BadInput
 from calib.identify import Fit, fit_report
 from calib.identify.staged import fit_effects

@@ -14,10 +14,11 @@ import numpy as np
 from app.files.site import Site
 from app.files.text import read_text
 from app.history.store import Entry
-from app.session.folder import JOURNAL, PLAN, RUN, read_folder
+from app.session.folder import RUN, read_folder
 from app.session.journal import IDENTITIES, Journal
 from app.session.plan import Plan
-from app.session.taken import Taken, session_of, taken_in
+from app.session.taken import Taken, taken_in
+from app.session.within import JOURNAL, PLAN, session_of
 from app.verification import FORMAT, judge_session
 from calib.arrays import Array
 from calib.errors import BadInput

@@ -7,9 +7,10 @@ from app.files.site import Site, parse_site
 from app.files.text import read_text
 from app.session.journal import Journal
 from app.session.plan import Plan
+from app.session.within import JOURNAL, PLAN
 from calib.errors import BadInput
 
-SITE, PLAN, JOURNAL, RUN = "site.toml", "plan.json", "journal.sqlite", "run"
+SITE, RUN = "site.toml", "run"
 _DRAFT = "draft-"
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from app.files.text import read_text
-from app.session.folder import JOURNAL, PLAN
 from app.session.journal import IDENTITIES, Journal
+from app.session.within import JOURNAL, PLAN
 from calib.errors import BadInput
 
 

@@ -37,13 +37,14 @@ from app.session.events import (
     StepStarted,
     Stopped,
 )
-from app.session.folder import JOURNAL, RUN, make_folder, read_folder
+from app.session.folder import RUN, make_folder, read_folder
 from app.session.journal import PLANNED, Journal, StepState
 from app.session.plan import Plan, Step
 from app.session.recall import recall
 from app.session.routines import ROUTINES
 from app.session.station import Station
 from app.session.unwritten import UNWRITTEN, export_at_end, unwritten
+from app.session.within import JOURNAL
 from app.session.work import Done, StartOver, Work
 from calib.errors import BadInput
 from drivers.errors import DeviceError

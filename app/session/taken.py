@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.session.folder import JOURNAL, PLAN
 from app.session.journal import IDENTITIES, Journal
+from app.session.within import JOURNAL
 from calib.arrays import Array
 
 
@@ -54,12 +54,6 @@ def taken_in(session: Path) -> Taken:
         )
     finally:
         journal.close()
-
-
-def session_of(run: str) -> Path | None:
-    """The session that left a run, if the run still lies in it."""
-    session = Path(run).parent
-    return session if (session / JOURNAL).is_file() and (session / PLAN).is_file() else None
 
 
 def spans(columns: Mapping[str, Iterable[Array]]) -> dict[str, Span]:

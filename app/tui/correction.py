@@ -82,7 +82,7 @@ class Corrections:
         inside = folder.name == "run" and (folder.parent / "journal.sqlite").is_file()
         model = (folder.parent if inside else self._desk.root) / "model.toml"
         model.parent.mkdir(parents=True, exist_ok=True)
-        from app.files.models import write_model  # brings scipy's statistics: not at start
+        from app.files.models import write_model
 
         write_model(model, answer.fit, self._desk.study.way())
         return model

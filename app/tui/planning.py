@@ -15,8 +15,8 @@ from textual.widgets import Button, Checkbox, Input, RadioButton, RadioSet, Stat
 from app.files.pose_table import Pose, read_poses
 from app.files.poses import full_poses, nest_matrix, read_pose_file
 from app.files.site import Site
-from app.session import Plan, PlanOptions, measure_plan
-from app.session.plans import Order
+from app.session.plan import Plan
+from app.session.plans import Order, PlanOptions, measure_plan
 from app.tui.dialogs import Dialog
 from calib.poses import design_poses
 from calib.poses.margin import stroke_margin

@@ -1,6 +1,6 @@
 """The study of what was measured: which runs, which effects, the fit, the discovery.
 
-What needs the statistics of scipy is imported when it is used: the screens open without it.
+What needs the engine is imported when it is used: the screens open without it.
 """
 
 import asyncio

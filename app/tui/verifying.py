@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from app.files.site import Site
-from app.session import Plan
+from app.session.plan import Plan
 from app.verification import Verification, judge_session
 from app.verification import verification_plan as plan_for
 from calib.arrays import Array

@@ -8,9 +8,12 @@ To add a verb, write a module that
   function);
 - stays a face: arguments in, one call into the layers below, the answer printed. About 150 lines.
 
-It is found by its file name (``import_.py`` is ``import``) and imported only when it is called, so
-heavy imports (numpy, drivers) at its top are fine. Its place in ``pkmcal --help`` comes from
-``TASKS`` in :mod:`app.cli`; a verb that is missing there is listed last.
+It is found by its file name (``import_.py`` is ``import``) and imported when it is called or asked
+for its help. At its top it imports what its help needs and no more; what answers (jobs, ``calib``,
+numpy, screens) is imported in the function that calls it, and types for the checker alone under
+``TYPE_CHECKING``. Numbers that help texts state lie in :mod:`app.defaults` and
+:mod:`calib.defaults`. Its place in ``pkmcal --help`` comes from ``TASKS`` in :mod:`app.cli`; a verb
+that is missing there is listed last.
 
 Errors are raised, never printed: :class:`calib.errors.BadInput` ends the program with exit code 2,
 :class:`drivers.errors.DeviceError` with 3, :class:`app.errors.StoppedByOperator` with 4,
@@ -28,6 +31,8 @@ error. Options that several verbs share (``--json``) are decorators in :mod:`app
     @answer.json_option
     def command(runs: tuple[str, ...], as_json: bool) -> None:
         \"\"\"Fit the baseline model, plus the effects asked for, to one or several runs.\"\"\"
-        ...
-        answer.show(result, as_json, text)
+        from app.jobs.fitting import fit
+
+        found = fit(runs)
+        answer.show(found.to_json(), as_json, words(found))
 """

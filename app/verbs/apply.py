@@ -4,22 +4,22 @@ import asyncio
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from app import answer
-from app.console import ConsoleFace, in_daemon_thread, stopping, unattended
-from app.files.fits import SavedFit, read_fit
-from app.files.site import Site, load_site
-from app.jobs.applying import apply_report
-from app.session.station import Station
-from app.writeback.gates import LIMITS, Gates
-from app.writeback.procedure import Applied, WriteBack
-from app.writeback.proposal import Change, Proposal
+from app.defaults import LIMITS
 from calib.digits import Digits, fixed
 from calib.errors import BadInput
-from calib.pose_error import Summary
+
+if TYPE_CHECKING:
+    from app.files.fits import SavedFit
+    from app.files.site import Site
+    from app.writeback.gates import Gates
+    from app.writeback.procedure import Applied
+    from app.writeback.proposal import Change, Proposal
+    from calib.pose_error import Summary
 
 TABLE_ENTRY = re.compile(r"(.+-table\.[^.]+)\.\d+")
 
@@ -65,6 +65,10 @@ def command(
     stored, loaded again and read back. Any failure brings the snapshot back. Effects of the
     measurement are never written.
     """
+    from app.files.fits import read_fit
+    from app.files.site import load_site
+    from app.writeback.gates import Gates
+
     site = load_site(site_file)
     fit = read_fit(fit_file)
     gates = Gates.with_limits(dict(_limit(text) for text in limits))
@@ -81,19 +85,24 @@ def _limit(text: str) -> tuple[str, float]:
 
 
 async def _apply(
-    site: Site,
-    fit: SavedFit,
-    gates: Gates,
+    site: "Site",
+    fit: "SavedFit",
+    gates: "Gates",
     folder: Path,
     dry_run: bool,
     yes: bool,
     alone: bool,
     quiet: bool,
 ) -> tuple[dict[str, Any], str]:
+    from app.console import ConsoleFace, in_daemon_thread, stopping, unattended
+    from app.jobs.applying import apply_report
+    from app.session.station import Station
+    from app.writeback.procedure import WriteBack
+
     station = Station(site)
     alone = unattended(alone)
 
-    async def confirm(proposal: Proposal, before: Summary, after: Summary) -> bool:
+    async def confirm(proposal: "Proposal", before: "Summary", after: "Summary") -> bool:
         if yes:
             return True
         if alone:
@@ -128,7 +137,7 @@ async def _apply(
     return report.to_json(), table(applied.proposal) + "\n" + _words(applied)
 
 
-def table(proposal: Proposal) -> str:
+def table(proposal: "Proposal") -> str:
     """Old, new and difference of every parameter; then what is left out, and why.
 
     Of a cyclic table only the entry that changes most is shown: 32 lines a leg hide the rest.
@@ -142,7 +151,7 @@ def table(proposal: Proposal) -> str:
     return "\n".join(lines)
 
 
-def _row(name: str, c: Change) -> tuple[str, ...]:
+def _row(name: str, c: "Change") -> tuple[str, ...]:
     digits = Digits.of(c.sigma, c.old, c.new)
     return (
         name, digits.text(c.old), digits.text(c.new), digits.text(c.new - c.old, signed=True),
@@ -151,7 +160,7 @@ def _row(name: str, c: Change) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def _readable(changes: Sequence[Change]) -> list[tuple[str, Change]]:
+def _readable(changes: "Sequence[Change]") -> "list[tuple[str, Change]]":
     """Every change with its name; of each table the largest, with the number of its entries."""
     tables: dict[str, list[Change]] = {}
     for change in changes:
@@ -164,11 +173,11 @@ def _readable(changes: Sequence[Change]) -> list[tuple[str, Change]]:
     ]
 
 
-def _size(change: Change) -> float:
+def _size(change: "Change") -> float:
     return abs(change.new - change.old)
 
 
-def _words(applied: Applied) -> str:
+def _words(applied: "Applied") -> str:
     return (
         f"check poses: peak {applied.before.position_peak_um:.1f} um before, "
         f"{applied.after.position_peak_um:.1f} um after (tracker noise alone: "

@@ -3,14 +3,14 @@
 import time
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
 
 from app import answer
-from app.session.folder import latest_session
-from app.session.listing import Following, Happening
+
+if TYPE_CHECKING:
+    from app.session.listing import Following, Happening
 
 POLL_S = 0.5
 SILENT_S = 30.0
@@ -34,6 +34,9 @@ def command(session: Path | None, folder: Path) -> None:
     on whether it is watched or not. To stop the machine use the terminal that runs it, or the
     emergency stop.
     """
+    from app.session.folder import latest_session
+    from app.session.listing import Following
+
     followed = Following(session if session is not None else latest_session(folder))
     facts = followed.facts
     answer.say(f"{followed.folder}: {facts.purpose}, {facts.machine} {facts.serial}, {facts.title}")
@@ -43,7 +46,10 @@ def command(session: Path | None, folder: Path) -> None:
         answer.say("left; the session goes on")
 
 
-def _watch(followed: Following) -> None:
+def _watch(followed: "Following") -> None:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn
+
     console = Console(highlight=False, soft_wrap=True)
     columns = (TextColumn("{task.completed:.0f} of {task.total:.0f}"), BarColumn(24),
                TextColumn("{task.description}", markup=False))  # fmt: skip
@@ -72,6 +78,6 @@ def _watch(followed: Following) -> None:
             news = followed.news()
 
 
-def _line(one: Happening) -> str:
+def _line(one: "Happening") -> str:
     clock = f"{datetime.fromisoformat(one.utc).astimezone():%H:%M:%S}" if one.utc else "        "
     return f"{clock}  {one.kind:8}  {one.text}"

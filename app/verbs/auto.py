@@ -10,12 +10,8 @@ import click
 
 from app import answer
 from app.auto import Limits
-from app.auto.flight import FEWEST_FIRST, MOST_FIRST, Flight, folder_of, limits_of
-from app.auto.station import StationLaboratory
-from app.console import ConsoleFace, in_daemon_thread, stopping, unattended
-from app.files.site import load_site
+from app.defaults import FEWEST_FIRST, MOST_FIRST
 from app.jobs.automatic import AutoReport
-from app.session.station import Station
 
 
 @click.command()
@@ -66,6 +62,9 @@ def command(
     limit. With somebody at the terminal every decision is asked first: it may be skipped, or
     another one chosen.
     """
+    from app.auto.flight import folder_of, limits_of
+    from app.console import unattended
+
     folder = folder_of(out)
     limits = limits_of(folder, target_um, hours, first, apply=not no_apply)
     report = asyncio.run(
@@ -78,6 +77,12 @@ async def fly(
     site_file: Path, folder: Path, limits: Limits, seed: int, *, alone: bool, quiet: bool
 ) -> AutoReport:
     """Decide and do on a site's station; ``quiet``: of sessions nothing is told but decisions."""
+    from app.auto.flight import Flight
+    from app.auto.station import StationLaboratory
+    from app.console import ConsoleFace, stopping
+    from app.files.site import load_site
+    from app.session.station import Station
+
     station = Station(load_site(site_file))
     laboratory = StationLaboratory(station, folder / "sessions", unattended=alone)
     station.observers.watch(ConsoleFace(laboratory.answer, 0, quiet=quiet).hear)
@@ -91,6 +96,7 @@ async def fly(
 
 async def ask(text: str, answers: tuple[str, ...]) -> str:
     """Ask the person at the terminal; answers are numbered, the first is proposed."""
+    from app.console import in_daemon_thread
 
     def asked() -> str:
         for number, one in enumerate(answers, start=1):

@@ -10,9 +10,6 @@ import click
 
 from app import answer
 from app.analysis_options import model_options, residuals_option, watcher, written_residuals
-from app.files.runs import outside_runs
-from app.jobs.comparing import compare
-from app.show.record_words import excluded_lines, record_lines
 from calib.digits import Digits
 
 SHOWN = 6
@@ -50,6 +47,9 @@ def command(
     off. Nothing is written but the figures asked for with --out and the effect files asked for
     with --propose, which --add takes.
     """
+    from app.files.runs import outside_runs
+    from app.jobs.comparing import compare
+
     outside_runs(out, runs)
     outside_runs(residuals, runs)
     if propose is not None:
@@ -67,6 +67,8 @@ def command(
 
 def words(report: dict[str, Any]) -> str:
     """Say a comparison to a person."""
+    from app.show.record_words import excluded_lines, record_lines
+
     model = "baseline" + "".join(f" + {name}" for name in report["effects"])
     lines = [
         *record_lines(report),

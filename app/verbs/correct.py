@@ -10,18 +10,18 @@ import json
 import signal
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from app import answer
-from app.files.wanted_poses import Wanted, read_wanted
-from app.jobs.correcting import CorrectReport, report_of
-from app.jobs.correction_server import HOST, CorrectionServer
-from app.jobs.corrector import PAYLOAD, TEMPERATURE, Corrector
 from calib.errors import BadInput
-from calib.mechanism.task import FULL
 from calib.quantity import quantity
+
+if TYPE_CHECKING:
+    from app.files.wanted_poses import Wanted
+    from app.jobs.correcting import CorrectReport
+    from app.jobs.corrector import Corrector
 
 
 @click.command()
@@ -74,6 +74,9 @@ def command(
     was commanded before counts. Outside of where the machine was measured it refuses, and says how
     far. With --serve it answers requests until it is ended (Ctrl-C). Nothing moves.
     """
+    from app.jobs.correcting import report_of
+    from app.jobs.corrector import Corrector
+
     corrector = Corrector.load(model, machine)
     if serve is not None:
         _alone(serve=True, pose=pose, poses=poses, out=out, before=before, every=every)
@@ -101,7 +104,9 @@ def _alone(*, serve: bool, **other: object) -> None:
         )
 
 
-def _wanted(corrector: Corrector, pose: str | None, poses: Path | None) -> Wanted:
+def _wanted(corrector: "Corrector", pose: str | None, poses: Path | None) -> "Wanted":
+    from app.files.wanted_poses import Wanted, read_wanted
+
     if (pose is None) == (poses is None):
         raise BadInput(
             "both --pose and --poses" if pose else "no pose is given",
@@ -113,8 +118,10 @@ def _wanted(corrector: Corrector, pose: str | None, poses: Path | None) -> Wante
     return Wanted(("the pose",), corrector.task_of(_numbers(pose, corrector, "--pose"))[:, None])
 
 
-def _numbers(text: str, corrector: Corrector, option: str) -> list[float]:
+def _numbers(text: str, corrector: "Corrector", option: str) -> list[float]:
     """Numbers between commas or blanks, each in mm or rad or with a unit of its own."""
+    from calib.mechanism.task import FULL
+
     parts = text.split(",") if "," in text else text.split()
     own = corrector.coordinates
     names = own if len(parts) == len(own) else FULL
@@ -136,6 +143,8 @@ def _bare(part: str) -> float | str:
 def _told(
     channels: tuple[str, ...], payload: float | None, temperature: float | None
 ) -> dict[str, float]:
+    from app.jobs.corrector import PAYLOAD, TEMPERATURE
+
     told = {}
     for one in channels:
         name, sign, value = one.partition("=")
@@ -150,11 +159,13 @@ def _told(
     return told | {name: value for name, value in given.items() if value is not None}
 
 
-def _columns(report: CorrectReport, sent: str) -> tuple[str, ...]:
+def _columns(report: "CorrectReport", sent: str) -> tuple[str, ...]:
+    from calib.mechanism.task import FULL
+
     return report.actuators if sent == "q" else FULL
 
 
-def _table(report: CorrectReport, sent: str) -> str:
+def _table(report: "CorrectReport", sent: str) -> str:
     """Commands as a table: label, then actuator coordinates or a pose, every digit of them."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -164,7 +175,7 @@ def _table(report: CorrectReport, sent: str) -> str:
     return text.getvalue()
 
 
-def _words(report: CorrectReport, sent: str) -> str:
+def _words(report: "CorrectReport", sent: str) -> str:
     rows = []
     for one in report.poses:
         values = one.q if sent == "q" else one.pose
@@ -177,8 +188,10 @@ def _words(report: CorrectReport, sent: str) -> str:
     return "\n".join([*lines, *([""] if far else []), *far])
 
 
-async def _serve(corrector: Corrector, port: int, as_json: bool) -> None:
+async def _serve(corrector: "Corrector", port: int, as_json: bool) -> None:
     """Answer until SIGINT or SIGTERM."""
+    from app.jobs.correction_server import HOST, CorrectionServer
+
     server, ended = CorrectionServer(corrector, port), asyncio.Event()
     loop = asyncio.get_running_loop()
 

@@ -8,18 +8,18 @@ import json
 import time
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
-from rich.console import Console
 
 from app import answer
 from app.auto import Limits
-from app.console import stopping
-from app.demo.job import Demo, Outcome
-from app.demo.screen import DemoScreen, result_lines
 from app.demo.station import mock_station
 from app.errors import StoppedByOperator
 from app.verbs import auto
+
+if TYPE_CHECKING:
+    from app.demo.job import Demo, Outcome
 
 COLUMNS = ("peak um", "std um", "peak deg", "std deg")
 REAL_TIME_EVERY, REAL = 6, 100.0
@@ -102,6 +102,11 @@ def command(
     With --linuxcnc 42 parameters go into LinuxCNC's HAL pins and files; it moves in real time, so
     every sixth pose is verified, and a second holds 100 at most.
     """
+    from rich.console import Console
+
+    from app.demo.job import Demo
+    from app.demo.screen import DemoScreen, result_lines
+
     folder = out or Path("out") / f"demo-{datetime.now():%Y%m%d-%H%M%S}"
     folder.mkdir(parents=True, exist_ok=True)
     folder = folder.resolve()
@@ -140,7 +145,9 @@ def _automatic(folder: Path, seed: int, scale: float, target_um: float, as_json:
     answer.show(report.to_json(), as_json, auto.words(report))
 
 
-async def _run(demo: Demo, site_file: Path) -> Outcome:
+async def _run(demo: "Demo", site_file: Path) -> "Outcome":
+    from app.console import stopping
+
     try:
         with stopping(demo.stop):
             return await demo.run(site_file)
@@ -148,7 +155,7 @@ async def _run(demo: Demo, site_file: Path) -> Outcome:
         raise StoppedByOperator() from None
 
 
-def _json(outcome: Outcome, seconds: float) -> dict[str, object]:
+def _json(outcome: "Outcome", seconds: float) -> dict[str, object]:
     return {
         "format": "pkm-demo/1",
         "before": {k: v for k, v in outcome.before.to_json().items() if k != "errors"},

@@ -3,17 +3,15 @@
 The poses file that it writes is measured with pkmcal measure; then fit old and new run together.
 """
 
+import math
 from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 
 from app import answer
 from app.analysis_options import model_options, offer_options, offers
-from app.files.runs import outside_runs
-from app.jobs.following_up import design
-from calib.discover.design import CANDIDATES
+from calib.defaults import FOLLOW_UP_FROM
 
 
 @click.command()
@@ -26,7 +24,9 @@ from calib.discover.design import CANDIDATES
     help="Two effects; B may be 'nothing': is A there at all?",
 )
 @click.option("--n", "count", default=10, show_default=True, type=click.IntRange(1, 60))
-@click.option("--candidates", default=CANDIDATES, show_default=True, type=click.IntRange(20, 5000))
+@click.option(
+    "--candidates", default=FOLLOW_UP_FROM, show_default=True, type=click.IntRange(20, 5000)
+)
 @click.option("--seed", default=1, show_default=True, help="Seed of the reachable candidates.")
 @click.option("--out", type=answer.WrittenFile(), help="Write a poses file for measure.")
 @model_options
@@ -51,6 +51,9 @@ def command(
     ones where they show nothing. The answer says how likely the right one is recognised now, and
     with the follow-up too.
     """
+    from app.files.runs import outside_runs
+    from app.jobs.following_up import design
+
     outside_runs(out, runs)
     plan = design(
         runs,
@@ -98,4 +101,4 @@ def words(report: dict[str, Any]) -> str:
 
 
 def _coordinate(name: str, value: float) -> str:
-    return f"{value:.2f}" if name in "xyz" else f"{np.rad2deg(value):.3f}"
+    return f"{value:.2f}" if name in "xyz" else f"{math.degrees(value):.3f}"

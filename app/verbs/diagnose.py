@@ -18,9 +18,6 @@ from app.analysis_options import (
     watcher,
     written_residuals,
 )
-from app.files.runs import outside_runs
-from app.jobs.discovering import diagnose
-from app.show.record_words import excluded_lines, record_lines
 from calib.digits import plus_minus
 
 
@@ -46,6 +43,9 @@ def command(
     The answer says which effect is missing, how sure that is, how large it is and what adding it
     would bring; or that nothing is missing; or that something unknown is.
     """
+    from app.files.runs import outside_runs
+    from app.jobs.discovering import diagnose
+
     outside_runs(residuals, runs)
     with answer.working("testing every known effect"):
         asked = diagnose(
@@ -58,6 +58,8 @@ def command(
 
 def words(report: dict[str, Any]) -> str:
     """Say a diagnosis to a person."""
+    from app.show.record_words import record_lines
+
     base = report["baseline"]
     lines = [
         *record_lines(report),
@@ -90,6 +92,8 @@ def um(value: float | None) -> str:
 
 def bad_lines(report: dict[str, Any]) -> list[str]:
     """Excluded readings, one a line or in ranges."""
+    from app.show.record_words import excluded_lines
+
     if not report["bad_readings"]:
         return []
     return ["", "Excluded readings:", *(f"  {line}" for line in excluded_lines(report))]

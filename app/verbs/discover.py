@@ -18,9 +18,6 @@ from app.analysis_options import (
     watcher,
     written_residuals,
 )
-from app.files.runs import outside_runs
-from app.jobs.discovering import discover
-from app.show.record_words import record_lines
 from app.verbs.diagnose import bad_lines, not_asked, sizes, um
 
 
@@ -49,6 +46,9 @@ def command(
 
     An effect is accepted only if poses that the fit has not seen are predicted no worse with it.
     """
+    from app.files.runs import outside_runs
+    from app.jobs.discovering import discover
+
     outside_runs(save, runs)
     outside_runs(residuals, runs)
     with answer.working("looking for effects, adding the best, fitting again"):
@@ -65,6 +65,8 @@ def command(
 
 def words(report: dict[str, Any]) -> str:
     """Say a discovery to a person: the staircase, what was found, what to do next."""
+    from app.show.record_words import record_lines
+
     steps = [
         (
             f"+ {step['added']}"

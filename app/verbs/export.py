@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from app import answer
-from app.jobs.exporting import PLAIN, SHIPPED, export
+from app.defaults import PLAIN, TEMPLATES
 from calib.errors import BadInput
 
 
@@ -19,7 +19,7 @@ from calib.errors import BadInput
     "form",
     required=True,
     metavar="FORM",
-    help=f"{', '.join((*PLAIN, *SHIPPED))}, or a template of one's own (FILE.j2).",
+    help=f"{', '.join((*PLAIN, *TEMPLATES))}, or a template of one's own (FILE.j2).",
 )
 @click.option("--machine", help="Machine file, where it is not the one that MODEL names.")
 @click.option("--out", type=answer.WrittenFile(), help="Write it here.")
@@ -30,6 +30,8 @@ def command(model: Path, form: str, machine: str | None, out: Path | None, force
     Nothing is sent. A template is sandboxed, and what it names without its being there is a fault
     with its line.
     """
+    from app.jobs.exporting import export
+
     text = export(model, form, machine=machine)
     if out is None:
         click.echo(text, nl=False)

@@ -10,9 +10,6 @@ import click
 
 from app import answer
 from app.analysis_options import mask_option, model_options, residuals_option, written_residuals
-from app.files.runs import outside_runs
-from app.jobs.fitting import fit
-from app.show.record_words import excluded_lines, record_lines
 from calib.digits import Digits, fixed
 
 
@@ -39,6 +36,9 @@ def command(
     Several runs are fitted together: geometry and machine effects are shared, each run has its own
     place of the tracker. Nothing is written but the file named with --save.
     """
+    from app.files.runs import outside_runs
+    from app.jobs.fitting import fit
+
     outside_runs(save, runs)
     outside_runs(residuals, runs)
     found = fit(runs, add=add, model=model, mask=mask)
@@ -52,6 +52,8 @@ def command(
 
 def words(report: dict[str, Any]) -> str:
     """Say a fit to a person."""
+    from app.show.record_words import excluded_lines, record_lines
+
     lines = [
         *record_lines(report),
         f"{report['readings']} readings, effects: {', '.join(report['effects']) or 'none'}",

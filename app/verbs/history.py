@@ -1,14 +1,16 @@
 """What became of each machine: sets, fits, verifications, what changed, where it drifts"""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from app import answer
-from app.files.site import load_site
-from app.jobs.looking_back import DriftEntry, MachineEntry, SeriesEntry, history_of
 from app.report.words import with_uncertainty
 from app.verbs.sessions import clock
+
+if TYPE_CHECKING:
+    from app.jobs.looking_back import DriftEntry, MachineEntry, SeriesEntry
 
 
 @click.command()
@@ -43,6 +45,9 @@ def command(
     kept there. What changed between the last two calibrations is judged over all parameters
     together (family-wise p below 0.05); with three or more, a drift and where it leads.
     """
+    from app.files.site import load_site
+    from app.jobs.looking_back import history_of
+
     if tolerance_um is None and site_file is not None:
         tolerance_um = load_site(site_file).record.tolerance_um
     found = history_of(folder, serial=serial, tolerance_um=tolerance_um)
@@ -50,7 +55,7 @@ def command(
     answer.show(found.to_json(), as_json, text or f"no history in {folder}")
 
 
-def words(machine: MachineEntry, everything: bool = False) -> str:
+def words(machine: "MachineEntry", everything: bool = False) -> str:
     """One machine as text: events, then parameters, then what is to be expected."""
     name = f"{machine.machine} {machine.serial}".strip()
     lines = [name, *(f"  {clock(e.utc)}  {e.kind:12}  {e.says}" for e in machine.events)]
@@ -69,7 +74,7 @@ def words(machine: MachineEntry, everything: bool = False) -> str:
     return "\n".join(lines)
 
 
-def _row(one: SeriesEntry) -> tuple[str, ...]:
+def _row(one: "SeriesEntry") -> tuple[str, ...]:
     assert one.change is not None
     assert one.change_sigma is not None
     assert one.p_value is not None
@@ -81,7 +86,7 @@ def _row(one: SeriesEntry) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def drift_words(found: DriftEntry, unit: str) -> str:
+def drift_words(found: "DriftEntry", unit: str) -> str:
     """``2.1 +- 0.4 um a month; out of tolerance in about 5 months``."""
     scale, unit = (1e3, "um") if unit == "mm" else (1.0, unit)
     rate, sigma = with_uncertainty(scale * found.rate, scale * found.sigma)

@@ -1,26 +1,20 @@
 """See which parameters readings can tell apart, and what another reading would buy"""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from app import answer
 from app.analysis_options import chosen_machine, machine_options
-from app.files.poses import nest_matrix, read_pose_file
-from app.files.site import load_site
-from app.show.identifiability_words import report
-from calib.analysis.benefit import options
-from calib.analysis.coverage import workspace_poses
-from calib.analysis.gauge import gauges
-from calib.analysis.identifiability import identifiability
-from calib.analysis.observation import Sights, judge, observe
-from calib.analysis.subsets import compare_subsets, matching
-from calib.arrays import Array
-from calib.mechanism.description import Machine
-from calib.poses.reach import PoseSet, sample_poses
-from calib.poses.readings import HAN_2020, DirectionReadings, PoseNoise
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from calib.analysis.observation import Sights
+    from calib.arrays import Array
+    from calib.mechanism.description import Machine
+    from calib.poses.reach import PoseSet
 
 POSES, FRESH = 60, 300
 NEST_RADIUS = 100.0
@@ -83,6 +77,16 @@ def command(
     apart. Predicted errors show that a choice of the most sensitive parameters is not a choice of
     identifiable ones.
     """
+    import numpy as np
+
+    from app.show.identifiability_words import report
+    from calib.analysis.benefit import options
+    from calib.analysis.coverage import workspace_poses
+    from calib.analysis.gauge import gauges
+    from calib.analysis.identifiability import identifiability
+    from calib.analysis.observation import judge, observe
+    from calib.analysis.subsets import compare_subsets, matching
+
     machine = chosen_machine(machine_name, closure)
     generator = np.random.default_rng(seed)
     where = _poses(machine, poses, poses_file, generator)
@@ -110,8 +114,12 @@ def command(
 
 
 def _poses(
-    machine: Machine, count: int | None, file: Path | None, generator: np.random.Generator
-) -> PoseSet:
+    machine: "Machine", count: int | None, file: Path | None, generator: "np.random.Generator"
+) -> "PoseSet":
+    from app.files.poses import read_pose_file
+    from calib.analysis.coverage import workspace_poses
+    from calib.poses.reach import sample_poses
+
     if file:
         return read_pose_file(file, machine).pose_set
     if count is None:
@@ -119,7 +127,7 @@ def _poses(
     return sample_poses(machine, count, generator)
 
 
-def _parameters(machine: Machine) -> list[str]:
+def _parameters(machine: "Machine") -> list[str]:
     return [p.name for p in machine.parameters]
 
 
@@ -131,7 +139,14 @@ def _sights(
     frame_free: bool,
     nests_free: bool,
     no_base_nests: bool,
-) -> Sights:
+) -> "Sights":
+    import numpy as np
+
+    from app.files.poses import nest_matrix
+    from app.files.site import load_site
+    from calib.analysis.observation import Sights
+    from calib.poses.readings import HAN_2020, DirectionReadings, PoseNoise
+
     sigma = 5.0 if sigma_um is None else sigma_um
     if sigma <= 0.0:
         raise click.BadParameter("the uncertainty must be positive", param_hint="--sigma-um")
@@ -152,7 +167,9 @@ def _sights(
     return Sights(none, sigma * 1e-3, base, frame_free=frame_free, pose_noise=noise)
 
 
-def _circle(count: int, radius: float) -> Array:
+def _circle(count: int, radius: float) -> "Array":
     """Nests on a circle about the z axis, (3, count); the first towards y."""
+    import numpy as np
+
     angle = np.pi / 2.0 + 2.0 * np.pi * np.arange(count) / count
     return radius * np.stack([np.cos(angle), np.sin(angle), np.zeros(count)])

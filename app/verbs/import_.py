@@ -10,9 +10,6 @@ import click
 
 from app import answer
 from app.files.shipped_maps import shipped_maps
-from app.jobs.guessing import guess_map
-from app.jobs.importing import import_run
-from app.show.record_words import record_lines
 from calib.errors import BadInput
 
 FILE = click.Path(path_type=Path, dir_okay=False)
@@ -50,6 +47,9 @@ def command(
     (units, signs, frames, nests); what they prove is refused with what to change. --guess writes a
     first map, with remarks, to the file named with --out.
     """
+    from app.jobs.guessing import guess_map
+    from app.jobs.importing import import_run
+
     if guess:
         if plan or commands or header:
             raise click.UsageError("--guess takes no --map, --header or --commands")
@@ -74,6 +74,8 @@ def command(
 
 
 def _words(report: dict[str, Any]) -> str:
+    from app.show.record_words import record_lines
+
     lines = [
         *record_lines(report),
         f"{', '.join(report['runs'])}: {report['readings']} readings at {report['poses']} poses of "

@@ -1,24 +1,19 @@
 """Judge accuracy and repeatability by ISO 9283, from a run with cycles"""
 
+import math
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from app import answer
-from app.files.runs import read_run
-from calib.analysis.cycles import Attained, Campaign, campaign
-from calib.analysis.iso9283 import (
-    CYCLES,
-    DistanceResult,
-    PoseResult,
-    distance_result,
-    pose_result,
-)
 from calib.digits import fixed
 from calib.errors import BadInput
+
+if TYPE_CHECKING:
+    from calib.analysis.cycles import Attained, Campaign
+    from calib.analysis.iso9283 import DistanceResult, PoseResult
 
 MIXED = 3.0
 """How many times more than the poses' repeatability allows a distance may scatter."""
@@ -35,6 +30,9 @@ def command(run: Path, point: str, pairs: str, as_json: bool) -> None:
     The run repeats the same poses in cycles (pkmcal measure --cycles 30). With three nests read at
     a pose the whole pose is judged, else the SMR's centre.
     """
+    from app.files.runs import read_run
+    from calib.analysis.cycles import campaign
+
     loaded = read_run(run)
     held = campaign(loaded.machine, loaded.run, point)
     results = [(pose, _judge(pose)) for pose in held.poses]
@@ -61,14 +59,16 @@ def command(run: Path, point: str, pairs: str, as_json: bool) -> None:
     answer.show(data, as_json, _text(loaded.machine.name, held, results, distances))
 
 
-def _judge(pose: Attained) -> PoseResult:
+def _judge(pose: "Attained") -> "PoseResult":
+    from calib.analysis.iso9283 import pose_result
+
     angles = None
     if pose.command_angles is not None and pose.attained_angles is not None:
         angles = (pose.command_angles, pose.attained_angles)
     return pose_result(pose.command, pose.attained, angles)
 
 
-def _chosen_pairs(held: Campaign, pairs: str) -> list[tuple[Attained, Attained]]:
+def _chosen_pairs(held: "Campaign", pairs: str) -> "list[tuple[Attained, Attained]]":
     if not pairs:
         return list(pairwise(held.poses))
     by_label = {pose.label: pose for pose in held.poses}
@@ -85,8 +85,10 @@ def _chosen_pairs(held: Campaign, pairs: str) -> list[tuple[Attained, Attained]]
     return chosen
 
 
-def _distance(first: Attained, second: Attained) -> DistanceResult | None:
+def _distance(first: "Attained", second: "Attained") -> "DistanceResult | None":
     """Judge a pair over the cycles in which both were visited; None for fewer than two."""
+    from calib.analysis.iso9283 import distance_result
+
     common = sorted(set(first.cycles) & set(second.cycles))
     if len(common) < 2:
         return None
@@ -94,7 +96,9 @@ def _distance(first: Attained, second: Attained) -> DistanceResult | None:
     return distance_result((first.command, second.command), (columns[0], columns[1]))
 
 
-def _pose_data(pose: Attained, found: PoseResult) -> dict[str, Any]:
+def _pose_data(pose: "Attained", found: "PoseResult") -> dict[str, Any]:
+    import numpy as np
+
     data: dict[str, Any] = {
         "label": pose.label,
         "cycles": found.cycles,
@@ -109,7 +113,7 @@ def _pose_data(pose: Attained, found: PoseResult) -> dict[str, Any]:
     return data
 
 
-def _distance_data(first: str, second: str, found: DistanceResult) -> dict[str, Any]:
+def _distance_data(first: str, second: str, found: "DistanceResult") -> dict[str, Any]:
     return {
         "pair": [first, second],
         "cycles": found.cycles,
@@ -124,9 +128,9 @@ def _distance_data(first: str, second: str, found: DistanceResult) -> dict[str, 
 
 def _text(
     machine: str,
-    held: Campaign,
-    results: list[tuple[Attained, PoseResult]],
-    distances: list[tuple[str, str, DistanceResult]],
+    held: "Campaign",
+    results: "list[tuple[Attained, PoseResult]]",
+    distances: "list[tuple[str, str, DistanceResult]]",
 ) -> str:
     rows = [
         [
@@ -164,20 +168,22 @@ def _text(
     return "\n\n".join(parts)
 
 
-def _angle_cells(found: PoseResult) -> list[str]:
+def _angle_cells(found: "PoseResult") -> list[str]:
     """Largest angle of AP and of RP, deg."""
     if found.accuracy_angles is None or found.repeatability_angles is None:
         return []
-    turned = float(np.max(np.abs(found.accuracy_angles)))
-    spread = float(np.max(found.repeatability_angles))
-    return [f"{np.rad2deg(turned):.4f}", f"{np.rad2deg(spread):.4f}"]
+    turned = max(abs(float(one)) for one in found.accuracy_angles)
+    spread = max(float(one) for one in found.repeatability_angles)
+    return [f"{math.degrees(turned):.4f}", f"{math.degrees(spread):.4f}"]
 
 
 def _summary(
-    held: Campaign,
-    results: list[tuple[Attained, PoseResult]],
-    distances: list[tuple[str, str, DistanceResult]],
+    held: "Campaign",
+    results: "list[tuple[Attained, PoseResult]]",
+    distances: "list[tuple[str, str, DistanceResult]]",
 ) -> str:
+    from calib.analysis.iso9283 import CYCLES
+
     worst = max(results, key=lambda row: row[1].accuracy)
     loose = max(results, key=lambda row: row[1].repeatability)
     lines = [

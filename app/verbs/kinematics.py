@@ -8,7 +8,6 @@ from pathlib import Path
 import click
 
 from app import answer
-from app.jobs.kinematics import kinematics
 from calib.errors import BadInput
 
 
@@ -49,6 +48,8 @@ def command(
     has none is in mm or rad. Poses are x, y, z, rx, ry, rz with R = Rz(rz) Ry(ry) Rx(rx), or the
     coordinates that the machine commands. What corrects all effects too is pkmcal correct.
     """
+    from app.jobs.kinematics import kinematics
+
     if (actuators is None) == (poses is None):
         raise BadInput("one of --forward and --inverse is needed", remedy="Name one file")
     if actuators is not None:

@@ -6,7 +6,6 @@ from pathlib import Path
 import click
 
 from app import answer
-from app.jobs.listing import session_log
 
 QUIET = ("started",)
 """Kinds of entries that only --all shows: their ends tell as much."""
@@ -24,6 +23,8 @@ QUIET = ("started",)
 @answer.json_option
 def command(session: Path | None, folder: Path, everything: bool, as_json: bool) -> None:
     """Read the journal of SESSION: steps, alarms, questions and answers, with clock times."""
+    from app.jobs.listing import session_log
+
     found = session_log(session, folder=folder)
     head = found.session
     lines = [

@@ -3,29 +3,20 @@
 import shutil
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
-import numpy as np
 
 from app import answer
 from app.analysis_options import chosen_machine, machine_options
-from app.files.machines import load_machine
-from app.jobs.completing import complete as completed
-from app.jobs.urdf import machine_of_urdf
 from app.machine_templates import TEMPLATES
-from app.show.braille import plain
 from app.show.completion_words import completion_words
-from app.show.machine_drawing import draw_figure, draw_text
-from app.show.machine_words import inspection_data, inspection_words
-from calib.analysis.inspection import inspect
-from calib.analysis.skeleton import skeleton
 from calib.errors import BadInput
-from calib.mechanism.description import Machine
-from calib.mechanism.solve import Configuration, home_configuration, inverse
-from calib.mechanism.task import task_values
-from calib.poses.verification import verification_poses
 from calib.quantity import quantity
-from mocks.canopen.make_eds import controller_eds
+
+if TYPE_CHECKING:
+    from calib.mechanism.description import Machine
+    from calib.mechanism.solve import Configuration
 
 
 @click.group()
@@ -49,6 +40,12 @@ def check(machine_name: str, closure: str, seed: int, as_json: bool) -> None:
     Closure at home, mobility, constraints and redundancy, rank, limits and what of the workspace
     they keep out of reach. A file that cannot work ends with exit code 2, the line and a remedy.
     """
+    import numpy as np
+
+    from app.show.machine_words import inspection_data, inspection_words
+    from calib.analysis.inspection import inspect
+    from calib.poses.verification import verification_poses
+
     machine = chosen_machine(machine_name, closure)
     found = inspect(machine, np.random.default_rng(seed))
     grid = verification_poses(machine)
@@ -61,6 +58,12 @@ def check(machine_name: str, closure: str, seed: int, as_json: bool) -> None:
 @click.option("--out", type=answer.WrittenFile(), help="Write a figure (png, svg, pdf).")
 def draw(machine_name: str, closure: str, pose: str, out: Path | None) -> None:
     """Draw limbs and joints: into a figure, or from two sides in the terminal."""
+    import numpy as np
+
+    from app.show.braille import plain
+    from app.show.machine_drawing import draw_figure, draw_text
+    from calib.analysis.skeleton import skeleton
+
     machine = chosen_machine(machine_name, closure)
     configuration = _configuration(machine, pose)
     shape = skeleton(machine, configuration)
@@ -76,7 +79,10 @@ def draw(machine_name: str, closure: str, pose: str, out: Path | None) -> None:
     click.echo(f"platform at {x:.2f}, {y:.2f}, {z:.2f} mm; rx, ry, rz {turned} deg")
 
 
-def _configuration(machine: Machine, pose: str) -> Configuration:
+def _configuration(machine: "Machine", pose: str) -> "Configuration":
+    from calib.mechanism.solve import home_configuration, inverse
+    from calib.mechanism.task import task_values
+
     home = home_configuration(machine)
     if not pose:
         return home
@@ -114,6 +120,8 @@ def complete(machine_name: str, tool: bool, out: Path | None, as_json: bool) -> 
     imitate. They are proposed in the file's own words. Errors behind the last joint of an arm are
     where the nests are on its flange: with --tool they are proposed, too.
     """
+    from app.jobs.completing import complete as completed
+
     found = completed(machine_name, tool=tool)
     if out is not None:
         if out.exists():
@@ -150,6 +158,9 @@ def import_(
     others follow them. The errors that a calibration can see are put in by rank, as pkmcal machine
     complete does; home is a pose far from singular ones. xacro files are expanded first.
     """
+    from app.files.machines import load_machine
+    from app.jobs.urdf import machine_of_urdf
+
     if out.exists() and not force:
         raise BadInput("there is such a file already", place=str(out), remedy="Add --force.")
     text = machine_of_urdf(
@@ -186,6 +197,8 @@ def eds(machine_name: str, closure: str, out: Path | None, force: bool) -> None:
     names it: eds = "NAME_controller.eds" in [controller]. docs/protocols/canopen.md says what
     each object does.
     """
+    from mocks.canopen.make_eds import controller_eds
+
     machine = chosen_machine(machine_name, closure)
     name, text = controller_eds(machine)
     path = out or Path(name)
@@ -249,6 +262,11 @@ def new(file: Path, kind: str | None, settings: tuple[str, ...], yes: bool, forc
     The file is a beginning: put your own joint centres, limits and tolerances into it. What is
     written is checked at once.
     """
+    import numpy as np
+
+    from app.files.machines import load_machine
+    from calib.analysis.inspection import inspect
+
     if file.exists() and not force:
         raise BadInput("there is such a file already", place=str(file), remedy="Add --force.")
     given = dict(_setting(s) for s in settings)

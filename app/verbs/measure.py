@@ -7,10 +7,6 @@ from typing import cast
 import click
 
 from app import answer
-from app.console import run_on_console, unattended
-from app.files.site import load_site
-from app.jobs.measuring import begin_measuring, session_report
-from app.session.plans import Order
 
 
 @click.command()
@@ -76,6 +72,11 @@ def command(
     goes on where the session was. The whole path is checked against all limits before the first
     move.
     """
+    from app.console import run_on_console, unattended
+    from app.files.site import load_site
+    from app.jobs.measuring import begin_measuring, session_report
+    from app.session.plans import Order
+
     session = begin_measuring(
         load_site(site_file),
         poses_file,

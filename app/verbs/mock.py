@@ -26,17 +26,17 @@ def command(arguments: tuple[str, ...]) -> None:
     All arguments go to the station: pkmcal mock hexapod --seed 7 --json. Ends on Ctrl-C. What a
     person does at a station that runs: pkmcal mock do site.toml payload kg=10.
     """
-    # Imported here: whoever talks to a station needs none.
     if arguments[:1] == ("do",) and not {"-h", "--help"} & set(arguments):
         from mocks.hands import main as tell
 
         raise click.exceptions.Exit(tell(list(arguments[1:])))
-    from mocks.station import main as run
-    from mocks.station import parser
-
     if not arguments or {"-h", "--help"} & set(arguments):
+        from mocks.arguments import parser
+
         click.echo(_help(parser()), err=not arguments)
         raise click.exceptions.Exit(0 if arguments else USAGE)
+    from mocks.station import main as run
+
     raise click.exceptions.Exit(run(list(arguments)))
 
 

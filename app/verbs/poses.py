@@ -1,15 +1,14 @@
 """Choose where to measure, and see what accuracy to expect"""
 
+import math
 from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 
 from app import answer
-from app.jobs.posing import choose_poses, verification_grid
+from calib.defaults import POSES_FROM
 from calib.errors import BadInput
-from calib.poses.design import CANDIDATES
 
 
 @click.command()
@@ -40,7 +39,7 @@ from calib.poses.design import CANDIDATES
 @click.option(
     "--candidates",
     type=click.IntRange(1),
-    default=CANDIDATES,
+    default=POSES_FROM,
     show_default=True,
     help="Reachable candidates.",
 )
@@ -79,6 +78,8 @@ def command(
     within its tolerances needs beyond the drawing is kept free of them, so that the same poses can
     be measured again once it has been calibrated.
     """
+    from app.jobs.posing import choose_poses
+
     if machine_name and machine_option:
         raise BadInput("two machines are named", remedy="Give MACHINE or --machine, not both.")
     named = machine_name or machine_option or None
@@ -129,7 +130,7 @@ def _text(report: dict[str, Any]) -> str:
 def _kept_free(report: dict[str, Any]) -> str:
     """What stays free at the ends of the actuators' ranges, the least and the most."""
     parts = []
-    for unit, factor, shown in (("mm", 1.0, "mm"), ("rad", float(np.rad2deg(1.0)), "deg")):
+    for unit, factor, shown in (("mm", 1.0, "mm"), ("rad", math.degrees(1.0), "deg")):
         kept = [factor * one["each_end"] for one in report["kept_free"] if one["unit"] == unit]
         if kept:
             least, most = f"{min(kept):.2f}", f"{max(kept):.2f}"
@@ -144,6 +145,8 @@ def _number(value: float | None) -> str:
 def _verification(
     named: str | None, site_file: Path | None, out: Path | None, as_json: bool
 ) -> None:
+    from app.jobs.posing import verification_grid
+
     grid = verification_grid(named, site=site_file)
     if out:
         grid.save(out)

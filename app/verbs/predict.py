@@ -10,9 +10,6 @@ import click
 
 from app import answer
 from app.analysis_options import written_residuals
-from app.files.runs import outside_runs
-from app.jobs.predicting import predict
-from app.show.record_words import excluded_lines, record_lines
 from calib.digits import fixed
 
 
@@ -39,6 +36,9 @@ def command(
     --frame. RMS is told beside what noise and the model's own uncertainty would leave: a ratio of
     1 is a model that keeps what it says. No reading is left out as a stray.
     """
+    from app.files.runs import outside_runs
+    from app.jobs.predicting import predict
+
     outside_runs(out, runs)
     found = predict(model, runs, frame=frame)
     written_residuals(found, out)
@@ -48,6 +48,8 @@ def command(
 
 def words(report: dict[str, Any]) -> str:
     """Say a prediction to a person."""
+    from app.show.record_words import excluded_lines, record_lines
+
     lines = [
         *record_lines(report),
         f"{report['readings']} readings; model {report['model']}, effects: "

@@ -6,10 +6,6 @@ import click
 
 from app import answer
 from app.analysis_options import mask_option, model_options
-from app.files.runs import outside_runs
-from app.files.site import load_site
-from app.report.accuracy import Tolerance
-from app.report.build import Asked, write_report
 
 OUT = (Path("report.html"), Path("report.pdf"))
 
@@ -78,6 +74,11 @@ def command(
     With a tolerance it says PASS or FAIL. What was written to the controller is found in the
     history beside the run's session; how the model was found, in the file of --model.
     """
+    from app.files.runs import outside_runs
+    from app.files.site import load_site
+    from app.report.accuracy import Tolerance
+    from app.report.build import Asked, write_report
+
     chosen = outs or OUT
     for out in chosen:
         outside_runs(out, runs)

@@ -6,9 +6,6 @@ from pathlib import Path
 import click
 
 from app import answer
-from app.console import run_on_console, unattended
-from app.jobs.measuring import begin_again, session_report
-from app.jobs.verifying import check_conclusion, concluded, is_verification
 from app.show.verification_words import verdict
 
 
@@ -29,6 +26,10 @@ def command(session_folder: Path | None, folder: Path, alone: bool, as_json: boo
     was sent, the last reference is read again, and the step is done anew. A verification ends with
     its verdict, beside the earlier one and in the file that it was asked for.
     """
+    from app.console import run_on_console, unattended
+    from app.jobs.measuring import begin_again, session_report
+    from app.jobs.verifying import check_conclusion, concluded, is_verification
+
     session = begin_again(session_folder, folder=folder, unattended=unattended(alone))
     answer.say(f"session {session.folder}")
     if is_verification(session):

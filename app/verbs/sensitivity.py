@@ -1,19 +1,19 @@
 """See which geometric errors matter, and what tolerances an accuracy asks for"""
 
+import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from app import answer
 from app.analysis_options import bars, chosen_machine, machine_options
-from app.show.charts import sensitivity_chart
-from calib.analysis.coverage import workspace_poses
-from calib.analysis.sensitivity import Index, Sensitivity, Tolerance, sensitivity, tolerances
 from calib.errors import BadInput
 
-DEGREE = float(np.deg2rad(1.0))
+if TYPE_CHECKING:
+    from calib.analysis.sensitivity import Index, Sensitivity, Tolerance
+
+DEGREE = math.radians(1.0)
 
 
 @click.command()
@@ -52,6 +52,11 @@ def command(
     Sensitivity is not identifiability: what matters most need not be what a calibration can tell
     apart. See pkmcal identifiability.
     """
+    import numpy as np
+
+    from calib.analysis.coverage import workspace_poses
+    from calib.analysis.sensitivity import sensitivity, tolerances
+
     for value, option in ((position_um, "--position-um"), (orientation_mdeg, "--orientation-mdeg")):
         if value is not None and value <= 0.0:
             raise BadInput(f"{option} is {value:g}", remedy="Give a positive accuracy.")
@@ -65,6 +70,8 @@ def command(
             orientation=None if orientation_mdeg is None else orientation_mdeg * 1e-3 * DEGREE,
         )
     if figure:
+        from app.show.charts import sensitivity_chart
+
         sensitivity_chart(found.parameters if each else found.kinds, machine.name, figure)
         answer.say(f"written to {figure}")
     data = {
@@ -88,7 +95,7 @@ def _per(unit: str) -> tuple[str, float]:
     return ("deg", DEGREE) if unit == "rad" else (unit, 1.0)
 
 
-def _data(index: Index) -> dict[str, Any]:
+def _data(index: "Index") -> dict[str, Any]:
     unit, factor = _per(index.unit)
     return {
         "name": index.name,
@@ -103,7 +110,7 @@ def _data(index: Index) -> dict[str, Any]:
     }
 
 
-def _tolerance(tolerance: Tolerance) -> dict[str, Any]:
+def _tolerance(tolerance: "Tolerance") -> dict[str, Any]:
     unit, factor = _per(tolerance.unit)
     return {
         "kind": tolerance.kind,
@@ -113,7 +120,7 @@ def _tolerance(tolerance: Tolerance) -> dict[str, Any]:
     }
 
 
-def _text(found: Sensitivity, machine: str, wanted: tuple[Tolerance, ...], each: bool) -> str:
+def _text(found: "Sensitivity", machine: str, wanted: "tuple[Tolerance, ...]", each: bool) -> str:
     indices = found.parameters if each else found.kinds
     drawn = bars([i.position_share + 1e-300 for i in indices])
     rows = []

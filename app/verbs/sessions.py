@@ -2,11 +2,14 @@
 
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from app import answer
-from app.jobs.listing import SessionEntry, list_sessions
+
+if TYPE_CHECKING:
+    from app.jobs.listing import SessionEntry
 
 
 @click.command()
@@ -16,6 +19,8 @@ from app.jobs.listing import SessionEntry, list_sessions
 @answer.json_option
 def command(folder: Path, as_json: bool) -> None:
     """List the sessions of a folder, the newest first: what each was and how far it came."""
+    from app.jobs.listing import list_sessions
+
     found = list_sessions(folder)
     heads = ("session", "begun", "what", "state", "machine", "poses", "readings", "title")
     width = max((len(one.title) for one in found.sessions), default=0)
@@ -24,7 +29,7 @@ def command(folder: Path, as_json: bool) -> None:
     answer.show(found.to_json(), as_json, text if rows else f"no session in {folder}")
 
 
-def _row(one: SessionEntry, width: int) -> tuple[str, ...]:
+def _row(one: "SessionEntry", width: int) -> tuple[str, ...]:
     state = one.state if one.state != "begun" else f"{one.done} of {one.steps} steps"
     machine = f"{one.machine} {one.serial}".strip()
     return (

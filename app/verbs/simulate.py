@@ -7,7 +7,6 @@ from typing import Any
 import click
 
 from app import answer
-from app.jobs.simulating import simulate
 from calib.errors import BadInput
 
 FOLDER = click.Path(path_type=Path, file_okay=False)
@@ -54,6 +53,8 @@ def command(machine: str, out: Path, truth: Path | None, as_json: bool, **option
     The same seed gives the same run; changing the noise changes nothing else. FILE with poses is
     a poses file or a CSV table.
     """
+    from app.jobs.simulating import simulate
+
     poses = options.pop("poses")
     effects = _values(options.pop("effect"))
     asked = {**options, "poses": int(poses) if poses.isdigit() else poses, "effects": effects}

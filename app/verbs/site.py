@@ -6,8 +6,6 @@ from typing import Any
 import click
 
 from app import answer
-from app.devices import all_kinds
-from app.files.site import load_site
 from calib.errors import BadInput
 from drivers.kind import Kind, Setting, Takes
 
@@ -37,6 +35,8 @@ def kinds(name: str | None, as_json: bool) -> None:
 
     Kinds of installed packages are listed like those that ship.
     """
+    from app.devices import all_kinds
+
     found = [(role, kind, declared) for role, kind, declared in all_kinds()]
     chosen = [entry for entry in found if name in (None, entry[1])]
     if not chosen:
@@ -55,6 +55,8 @@ def kinds(name: str | None, as_json: bool) -> None:
 @click.argument("site_file", type=click.Path(path_type=Path))
 def check(site_file: Path) -> None:
     """Read a site file and say what it describes; nothing is connected."""
+    from app.files.site import load_site
+
     site = load_site(site_file)
     click.echo(
         f"{site_file}: {site.machine.name}; controller {site.controller.kind} at "

@@ -2,15 +2,14 @@
 
 import asyncio
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from app import answer
-from app.console import ConsoleFace
-from app.files.site import load_site
-from app.jobs.applying import SetsReport, accept_held, bring_back, known_sets
-from app.session.station import Station
+
+if TYPE_CHECKING:
+    from app.jobs.applying import SetsReport
 
 
 @click.command()
@@ -37,6 +36,8 @@ def command(
     loaded again and read back again. It also clears the latch that blocks motion when the
     parameters are unknown.
     """
+    from app.files.site import load_site
+
     if sum((number is not None, only_list, take)) > 1:
         raise click.UsageError("--to, --list and --accept exclude one another")
     data, text = asyncio.run(_run(load_site(site_file), number, only_list, take, as_json))
@@ -46,6 +47,10 @@ def command(
 async def _run(
     site: Any, number: int | None, only_list: bool, take: bool, quiet: bool
 ) -> tuple[dict[str, Any], str]:
+    from app.console import ConsoleFace
+    from app.jobs.applying import accept_held, bring_back, known_sets
+    from app.session.station import Station
+
     station = Station(site)
     leave = station.observers.watch(ConsoleFace(lambda *_: None, 0, quiet=quiet).hear)
     try:
@@ -65,7 +70,7 @@ async def _run(
     return report.to_json(), text
 
 
-def _listed(report: SetsReport) -> tuple[dict[str, Any], str]:
+def _listed(report: "SetsReport") -> tuple[dict[str, Any], str]:
     rows = [
         (
             str(s.number), s.taken_utc, f"{s.checksum:#010x}",

@@ -6,12 +6,8 @@ from pathlib import Path
 import click
 
 from app import answer
-from app.console import run_on_console, unattended
-from app.files.site import load_site
-from app.jobs.verifying import begin_verifying, concluded
-from app.report.sources import run_before
+from app.defaults import REFERENCE_EVERY
 from app.show.verification_words import verdict
-from app.verification import REFERENCE_EVERY
 
 
 @click.command()
@@ -65,6 +61,11 @@ def command(
     show. Nothing is fitted and nothing is written to the controller. The answer is kept in the
     session's folder; one that was stopped ends with it after pkmcal resume.
     """
+    from app.console import run_on_console, unattended
+    from app.files.site import load_site
+    from app.jobs.verifying import begin_verifying, concluded
+    from app.report.sources import run_before
+
     site = load_site(site_file)
     session = begin_verifying(
         site,

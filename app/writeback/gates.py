@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from app.defaults import LIMITS
 from app.errors import GateRefused
 from app.files.controller_frames import frames_apart
 from app.files.fits import SavedFit
@@ -25,22 +26,6 @@ from calib.mechanism.rigid import Poses, pose_difference
 from calib.mechanism.solve import Configuration, forward, inverse
 from calib.pose_error import Summary
 from calib.poses import verification_poses
-
-LIMITS: dict[str, float] = {
-    "machine": 0.0,
-    "frame": 0.0,
-    "finite": 0.0,
-    "tolerance": 5.0,
-    "chi2": 4.0,
-    "holdout": 2.0,
-    "workspace": 0.0,
-    "condition": 2.0,
-    "uncertainty": 50.0,
-    "gain": 1.0,
-    "check-peak": 60.0,
-    "check-rms": 1.0,
-}
-"""Largest values that pass, by gate; meanings stand with the gates."""
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
+from calib.chance import chi2_above, chi2_below, f_above
 from calib.errors import BadInput
 from calib.evidence.repeats import pure_error
 from calib.identify.fitting import Fit
@@ -68,7 +68,7 @@ def runs_at_odds(fitted: Fit) -> AtOdds | None:
     if dof <= 0 or shared <= 0 or fitted.chi2_per_dof < TOGETHER_WORSE * chi2 / dof:
         return None
     ratio = (fitted.chi2 - chi2) / shared / (chi2 / dof)
-    if special.fdtrc(shared, dof, ratio) > BY_CHANCE:
+    if f_above(shared, dof, ratio) > BY_CHANCE:
         return None
     total = sum(one.readings * one.rms_mm**2 for one in apart)
     return AtOdds(math.sqrt(total / readings), fitted.rms_mm)
@@ -114,8 +114,8 @@ def untrue_uncertainties(fitted: Fit) -> str:
     if not fitted.dof > 0:
         return ""
     scatter = math.sqrt(fitted.chi2_per_dof)
-    if scatter > TOO_SMALL and special.chdtrc(fitted.dof, fitted.chi2) < BY_CHANCE:
+    if scatter > TOO_SMALL and chi2_above(fitted.dof, fitted.chi2) < BY_CHANCE:
         return f"The readings scatter {scatter:.2g} times as much as sx, sy, sz say"
-    if scatter < TOO_LARGE and special.chdtr(fitted.dof, fitted.chi2) < BY_CHANCE:
+    if scatter < TOO_LARGE and chi2_below(fitted.dof, fitted.chi2) < BY_CHANCE:
         return f"The readings scatter only {scatter:.2g} times as much as sx, sy, sz say"
     return ""

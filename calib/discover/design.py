@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.arrays import Array
+from calib.defaults import FOLLOW_UP_FROM
 from calib.discover.follow_up import FollowUp, own_to_each_run
 from calib.discover.old_and_new import (
     OldAndNew,
@@ -37,7 +38,6 @@ from calib.identify.signatures import EffectColumns, effect_columns
 from calib.poses.margin import tolerance_margin
 from calib.poses.reach import PoseSet, sample_poses
 
-CANDIDATES = 250
 DRAWS = 399
 NOT_SEEN = 0.05
 """p-value above which an effect's estimate says nothing; its usual size is taken instead."""
@@ -78,7 +78,7 @@ def design_follow_up(
     count: int,
     rng: np.random.Generator,
     *,
-    candidates: int = CANDIDATES,
+    candidates: int = FOLLOW_UP_FROM,
     conditions: Sequence[Mapping[str, float]] | None = None,
     watch: Callable[[str], None] | None = None,
 ) -> FollowUpPlan:

@@ -1,10 +1,10 @@
 """What diagnosis and discovery say: ``pkm-diagnosis/1`` and ``pkm-discovery/1``, and in words."""
 
 from collections.abc import Sequence
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
-from scipy import special
 
 from calib.discover.agreement import (
     TOGETHER_WORSE,
@@ -171,7 +171,7 @@ def _significant(estimates: Sequence[Estimate], acting: Sequence[str] = ()) -> l
     Several linear unknowns of a kind share 5 %; nonlinear ones are always listed.
     """
     linear = linear_among(estimate.unknown for estimate in estimates)
-    limit = -float(special.ndtri(0.025 / max(1, int(linear.sum()))))
+    limit = -NormalDist().inv_cdf(0.025 / max(1, int(linear.sum())))
     clear = np.array([abs(one.value) > limit * one.sigma for one in estimates])
     if linear.sum() == 1 or not np.any(clear & linear):
         chosen = np.array([estimate.name in acting for estimate in estimates])

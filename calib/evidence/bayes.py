@@ -14,7 +14,6 @@ Where even the best explanation leaves more than the stated noise, sigmas are ta
 """
 
 import numpy as np
-from scipy import special
 
 from calib.arrays import Array
 from calib.evidence.scores import Scores
@@ -58,7 +57,7 @@ def log_evidence(scores: Scores, index: int, residual_scores: Array) -> tuple[Ar
             share /= len(hypotheses) - 1
         prior = np.log(share / len(candidate.trials))
         parts.append(prior + _by_trial(scores, index, subset, residual_scores))
-    total = special.logsumexp(np.concatenate(parts), axis=0)
+    total = np.logaddexp.reduce(np.concatenate(parts), axis=0)
     return np.asarray(total), parts
 
 

@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg
 
 from calib.arrays import Array, BoolArray
 from calib.scaled import Scaled, normal_matrix
@@ -87,7 +86,7 @@ class LinearProblem:
         """Orthonormal rows (rank, R) that span the rows of J, priors left aside."""
         size = np.sqrt(np.sum(self.jacobian**2, axis=1))
         unit = self.jacobian / np.where(size > 0.0, size, 1.0)[:, None]
-        values, vectors = linalg.eigh(unit @ unit.T)
+        values, vectors = np.linalg.eigh(unit @ unit.T)
         seen = values > VANISHING * max(float(values[-1]), VANISHING) if values.size else values > 0
         return np.asarray((vectors[:, seen] / np.sqrt(values[seen])).T @ unit)
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
 from calib.arrays import Array, IntArray
+from calib.chance import log_normal_below
 from calib.evidence.tails import log_tail
 
 
@@ -26,7 +26,7 @@ class Neighbours:
         product = np.einsum("pd,pd->d", residuals[self.before], residuals[self.after])
         ratio = product / np.einsum("rd,rd->d", residuals, residuals)
         null = ratio[1:]
-        return np.asarray(-special.log_ndtr((null.mean() - ratio) / null.std()))
+        return -log_normal_below((null.mean() - ratio) / null.std())
 
 
 @dataclass(frozen=True, eq=False)

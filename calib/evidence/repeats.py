@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
 from calib.arrays import Array, IntArray
+from calib.chance import chi2_above
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,6 @@ def pure_error(
     return PureError(
         dof=freedom,
         variance=squares / freedom,
-        p_value=float(special.chdtrc(freedom, squares)),
+        p_value=float(chi2_above(freedom, squares)),
         excess=min(beyond / misfit, 1.0) if misfit > 0.0 else 0.0,
     )

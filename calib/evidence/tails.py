@@ -1,11 +1,12 @@
 """Logarithms of tail probabilities of chi-square, fast for many values, never underflowing."""
 
+import math
 from functools import lru_cache
 
 import numpy as np
-from scipy import special
 
 from calib.arrays import Array
+from calib.chance import chi2_above
 
 TABLE_END = 300.0
 """Chi-square up to which values are interpolated in a table."""
@@ -30,7 +31,7 @@ def _table(dof: float) -> tuple[Array, Array, float]:
     """Square roots of chi-square, log tail at them, and the end of the table."""
     end = TABLE_END + 2.0 * dof
     roots = np.linspace(0.0, np.sqrt(end), max(600, int(20.0 * np.sqrt(end))))
-    tail = special.chdtrc(dof, roots**2)
+    tail = chi2_above(dof, roots**2)
     small = tail < SMALLEST
     logs = np.log(np.where(small, 1.0, tail))
     logs[small] = _far_tail(roots[small] ** 2, dof)
@@ -48,7 +49,7 @@ def _far_tail(chi2: Array, dof: float) -> Array:
     fraction = np.zeros_like(x)
     for term in range(40 + int(np.sqrt(a)), 0, -1):
         fraction = term * (term - a) / (x + 2.0 * term + 1.0 - a - fraction)
-    return np.asarray(a * np.log(x) - x - special.gammaln(a) - np.log(x + 1.0 - a - fraction))
+    return np.asarray(a * np.log(x) - x - math.lgamma(a) - np.log(x + 1.0 - a - fraction))
 
 
 def log_any(log_p: Array, trials: float) -> Array:

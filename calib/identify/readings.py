@@ -10,9 +10,9 @@ every reading, does not make bad readings of good ones.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
 from calib.arrays import Array, BoolArray, IntArray
+from calib.chance import f_rarer_than
 from calib.runs.stack import Rows
 from calib.scaled import Scaled, normal_matrix
 
@@ -125,8 +125,7 @@ def _worst(
     size = int(own[worst])
     others = max((total - drop[worst]) / max(dof - size, 1.0), 1.0)
     ratio = drop[worst] / size / others
-    chance = count * float(special.fdtrc(size, max(dof - size, 1.0), ratio))
-    if chance > FALSE_ALARM:
+    if not f_rarer_than(FALSE_ALARM / count, size, max(dof - size, 1.0), ratio):
         return None, step
     return worst, step - spread[:, :, worst] @ freed[worst]
 

@@ -8,9 +8,9 @@ from collections import Counter
 from dataclasses import replace
 
 import numpy as np
-from scipy import special
 
 from calib.arrays import BoolArray, IntArray
+from calib.chance import poisson_at_least
 from calib.look.digits import decimals_of
 from calib.runs.record import Run
 from calib.runs.remark import Remark, lines_in_words, ranges
@@ -59,7 +59,7 @@ def _twice(run: Run) -> tuple[BoolArray, Remark | None]:
         last = first.setdefault(run.position[:, row].tobytes(), int(row))
         which[row] = last != row and _one_stop(run, int(row), last)
     found = int(which.sum())
-    if not found or special.gammainc(found, _one_stop_pairs(run) * _agreement(run)) > BY_CHANCE:
+    if not found or poisson_at_least(found, _one_stop_pairs(run) * _agreement(run)) > BY_CHANCE:
         return np.zeros_like(which), None
     lines = ranges(run.line[which], run.line[run.measured])
     return which, Remark(

@@ -12,13 +12,14 @@ rises by enough; so noise that a missing effect imitates is not taken for one wh
 columns are among J.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
 from calib.arrays import Array
+from calib.chance import chi2_above
 from calib.evidence.problem import LinearProblem
 from calib.noise.component import WHITE, Noise, Taking
 from calib.noise.whitening import Whitening
@@ -95,7 +96,7 @@ class _Likelihood:
         return Noise(
             scale=float(np.exp(clipped.get("scale", 0.0))),
             tau_s=0.0 if tau is None else float(np.exp(tau)),
-            share=float(special.expit(clipped["share"])) if "share" in clipped else 1.0,
+            share=1.0 / (1.0 + math.exp(-clipped["share"])) if "share" in clipped else 1.0,
             visit=float(np.exp(clipped["visit"])) if "visit" in clipped else 0.0,
             by_row="successive" in clipped,
         )
@@ -218,7 +219,7 @@ def _components(
 
 def _chance(gain: float) -> float:
     """Probability of such a rise where there is none of it: chi-square of one, from its edge."""
-    return float(0.5 * special.chdtrc(1.0, 2.0 * gain))
+    return float(0.5 * chi2_above(1.0, 2.0 * gain))
 
 
 def _spread(likelihood: _Likelihood, parts: tuple[str, ...], logs: tuple[float, ...]) -> Array:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.arrays import Array
+from calib.defaults import POSES_FROM
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.limits import Margin
@@ -15,7 +16,6 @@ from calib.poses.path import check_path, path_length, short_order
 from calib.poses.reach import PoseSet, sample_poses
 from calib.poses.readings import Readings
 
-CANDIDATES = 2500
 FRESH = 1000
 """Reachable poses, drawn apart from the candidates, on which the prediction is judged."""
 LEVER = 50.0
@@ -121,7 +121,7 @@ def design_poses(
     *,
     criterion: Criterion = "I",
     priors: bool = True,
-    candidates: int = CANDIDATES,
+    candidates: int = POSES_FROM,
     counts: Sequence[int] = TABLE,
     margin: Margin | None = None,
 ) -> Design:

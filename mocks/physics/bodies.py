@@ -3,20 +3,16 @@
 from functools import cache
 
 from calib.mechanism.description import Machine
+from mocks.arguments import MACHINES, WITH_OWN_FILES
 from mocks.physics.body import Body
 from mocks.physics.hexapod_body import HexapodBody
 from mocks.physics.ptm_body import PtmBody
 from mocks.physics.tripod_body import TripodBody
 from mocks.physics.truth import machine_file
 
-BODIES: dict[str, type[HexapodBody] | type[TripodBody] | type[PtmBody]] = {
-    "hexapod": HexapodBody,
-    "tripod": TripodBody,
-    "ptm": PtmBody,
-}
-
-WITH_OWN_FILES = ("hexapod", "ptm")
-"""Mechanisms whose mock takes a machine file of one's own: those with a controller on CANopen."""
+BODIES: dict[str, type[HexapodBody] | type[TripodBody] | type[PtmBody]] = dict(
+    zip(MACHINES, (HexapodBody, TripodBody, PtmBody), strict=True)
+)
 
 
 def body_of(machine: Machine) -> Body:

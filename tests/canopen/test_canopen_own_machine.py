@@ -10,9 +10,10 @@ from app.files.machines import load_machine
 from calib.errors import BadInput
 from drivers.canopen.kind import KIND
 from drivers.kind import ActuatorFacts, Surroundings
+from mocks.arguments import parser
 from mocks.own_files import own_files, own_machine
 from mocks.physics.truth import machine_file
-from mocks.station import build, parser
+from mocks.station import build
 
 SHIPPED = Path(calib.__file__).parent / "machines"
 

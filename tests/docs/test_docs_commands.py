@@ -13,7 +13,7 @@ import pytest
 
 from app.cli import pkmcal
 from bench.__main__ import benches
-from mocks.station import parser as station_parser
+from mocks.arguments import parser as station_parser
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]

@@ -10,8 +10,9 @@ from app.files.fits import SavedFit, read_fit
 from app.files.machines import load_machine
 from app.files.models import write_model
 from app.files.runs import read_run
-from app.session import PlanOptions, Session, measure_plan
 from app.session.known import compare_with_known
+from app.session.plans import PlanOptions, measure_plan
+from app.session.session import Session
 from app.session.station import Station
 from app.writeback.gates import Gates
 from app.writeback.procedure import Applied, WriteBack, undo

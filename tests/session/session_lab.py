@@ -12,8 +12,9 @@ from session_mock import POSES, site_text
 from app.clock import Clock
 from app.files.pose_table import Pose
 from app.files.site import Hands, Limits, Site, parse_site
-from app.session import PlanOptions, Session, measure_plan
 from app.session.plan import Plan
+from app.session.plans import PlanOptions, measure_plan
+from app.session.session import Session
 from app.session.station import Devices
 from calib.frames import Frame, nest_in_base
 from drivers.errors import DeviceError, NoTarget

@@ -12,9 +12,10 @@ from app.errors import GateRefused, StoppedByOperator
 from app.files.pose_table import Pose
 from app.files.site import parse_site
 from app.ownership import Ownership
-from app.session import PlanOptions, Session, measure_plan
 from app.session import events as ev
 from app.session.journal import Journal
+from app.session.plans import PlanOptions, measure_plan
+from app.session.session import Session
 from drivers.errors import (
     DeviceError,
     DriveFault,

@@ -14,9 +14,10 @@ from app.errors import StoppedByOperator
 from app.files.machines import load_machine
 from app.files.runs import read_run
 from app.files.site import Site, parse_site
-from app.session import PlanOptions, Session, measure_plan
 from app.session import events as ev
 from app.session.links import open_controller
+from app.session.plans import PlanOptions, measure_plan
+from app.session.session import Session
 from calib.identify import fit
 from calib.model import Model
 from calib.runs.stack import stack

@@ -11,12 +11,14 @@ from session_mock import POSES, Heard, site_text
 
 from app.errors import GateRefused
 from app.files.site import Site, parse_site
-from app.session import PlanOptions, Session, kinds, measure_plan
 from app.session import events as ev
+from app.session import kinds
 from app.session.journal import Journal
 from app.session.kinds import KINDS, StepKind
 from app.session.plan import Plan, PlanWriter
+from app.session.plans import PlanOptions, measure_plan
 from app.session.routines import ROUTINES
+from app.session.session import Session
 from calib.errors import BadInput
 from drivers.errors import DeviceError
 

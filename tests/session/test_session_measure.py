@@ -9,9 +9,9 @@ import pytest
 from session_mock import POSES, Heard, Mock
 
 from app.files.runs import read_run
-from app.session import PlanOptions, Session, measure_plan
 from app.session import events as ev
-from app.session.plans import Order
+from app.session.plans import Order, PlanOptions, measure_plan
+from app.session.session import Session
 from calib.identify import fit
 from calib.model import Model
 from calib.runs import Run

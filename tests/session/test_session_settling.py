@@ -8,9 +8,10 @@ import pytest
 from session_mock import POSES, Heard, site_text
 
 from app.files.site import Site, parse_site
-from app.session import PlanOptions, Session, measure_plan
 from app.session import events as ev
+from app.session.plans import PlanOptions, measure_plan
 from app.session.routines.beam import settle
+from app.session.session import Session
 from app.session.station import Devices
 from app.session.work import Work
 from drivers.errors import NotReady

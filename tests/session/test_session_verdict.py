@@ -13,8 +13,8 @@ from session_mock import POSES, Mock, site_text
 from app.cli import pkmcal
 from app.errors import StoppedByOperator
 from app.jobs.verifying import VERDICT, begin_verifying, concluded
-from app.session import Session
 from app.session import events as ev
+from app.session.session import Session
 from calib.errors import BadInput
 
 TWO = {label: POSES[label] for label in "ab"}

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 from session_mock import POSES, Mock
 
-from app.session import PlanOptions, Session, measure_plan
+from app.session.plans import PlanOptions, measure_plan
+from app.session.session import Session
 from app.verification import Verification, judge
 
 

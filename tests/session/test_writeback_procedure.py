@@ -13,9 +13,10 @@ from app.errors import GateRefused, StoppedByOperator
 from app.files.fits import SavedFit, read_fit
 from app.files.models import write_model
 from app.files.runs import read_run
-from app.session import PlanOptions, Session, measure_plan
 from app.session import events as ev
 from app.session.known import compare_with_known, read_held
+from app.session.plans import PlanOptions, measure_plan
+from app.session.session import Session
 from app.session.station import Devices, Station
 from app.writeback.gates import Gates
 from app.writeback.procedure import WriteBack, accept, undo

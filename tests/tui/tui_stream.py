@@ -6,10 +6,12 @@ from pathlib import Path
 import numpy as np
 
 from app.files.site import Site
-from app.session import PlanOptions, Session, kinds, measure_plan
 from app.session import events as ev
+from app.session import kinds
 from app.session.known import Snapshot
 from app.session.plan import Plan
+from app.session.plans import PlanOptions, measure_plan
+from app.session.session import Session
 from app.tui.analysis import FitAnswer
 from app.tui.correction import Comparison
 from app.tui.discovering import Search, Stair, View
