@@ -177,6 +177,7 @@ def _filters(taking: Taking, layout: _Layout, noise: Noise) -> _Filters:
         total[step] = seen[step] @ reach + white[step]
         gain[step] = reach @ np.linalg.inv(total[step])
         covariance -= gain[step] @ reach.swapaxes(1, 2)
+        covariance = 0.5 * (covariance + covariance.swapaxes(1, 2))
     factor = np.linalg.cholesky(total)
     carry = np.eye(size) - gain @ seen
     carry[:-1] *= fade[1:, :, :, None]

@@ -55,3 +55,20 @@ def test_whitened_columns_have_the_inner_products_of_the_inverse_covariance(nois
     flat = columns.reshape(5, -1)
     np.testing.assert_allclose(white @ white.T, flat @ np.linalg.solve(whole, flat.T), atol=1e-9)
     assert whitening.log_det == pytest.approx(np.linalg.slogdet(whole)[1], abs=1e-9)
+
+
+def test_a_long_run_keeps_its_covariances():
+    """What was read exactly is known exactly: rounding must not make less than nothing of it."""
+    rng = np.random.default_rng(2)
+    count = 600
+    motions = 5.0 * rng.standard_normal((2, 3, count))
+    taken = Taking(
+        np.zeros(count, dtype=int), 4.0 * np.arange(count), np.arange(count) // 3, motions
+    )
+    whitening = Whitening(taken, Noise(tau_s=32.0, visit=0.28, by_row=True))
+    alike = np.exp(-4.0 * np.abs(np.subtract.outer(np.arange(count), np.arange(count))) / 32.0)
+    together = np.equal.outer(taken.visit, taken.visit)
+    whole = np.einsum("ij,ab->iajb", np.eye(3), alike)
+    whole += 0.28**2 * np.einsum("uia,ujb,ab->iajb", motions, motions, together, optimize=True)
+    expected = np.linalg.slogdet(whole.reshape(3 * count, -1))[1]
+    assert whitening.log_det == pytest.approx(expected, abs=1e-6)
