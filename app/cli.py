@@ -89,12 +89,24 @@ def _says(verb: str) -> str:
         return source.readline().strip().strip('"').rstrip(".")
 
 
+def _manual(context: click.Context, option: click.Parameter, wanted: bool) -> None:
+    """Print the manual page and end."""
+    if wanted and isinstance(context.command, click.Group):
+        pages: Any = import_module("app.manual")
+        click.echo(pages.manual(context.command), nl=False)
+        context.exit()
+
+
 @click.command(
     cls=Verbs,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 @click.version_option(package_name="pkmcal")
+@click.option(
+    "--man", is_flag=True, is_eager=True, expose_value=False, callback=_manual,
+    help="Print the manual page, for man(1), and exit.",
+)  # fmt: skip
 @click.option("--site", type=click.Path(path_type=Path), help="Open the screens with this site.")
 @click.option(
     "--folder",

@@ -1,12 +1,14 @@
 """What the Fit screen shows: a fit, and how far the readings were off before it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from app.analysis import load_rows
+from app.analysis import load_rows, masked_rows
 from app.jobs.remembering import remember_fit
+from app.tui.reading_lines import ReadingLine, lines_of_fit
 from calib.arrays import Array
 from calib.identify import Fit, fit_report
 from calib.identify.staged import fit_effects
@@ -21,7 +23,8 @@ class FitAnswer:
     """A fit with its report (``pkm-fit/1``).
 
     ``miss_before`` and ``miss_after`` (N,) are 3D distances in mm of the accepted readings from
-    the drawing's machine (only the tracker's place fitted) and from the fitted one.
+    the drawing's machine (only the tracker's place fitted) and from the fitted one; ``readings``
+    are all, those left out as well.
     """
 
     runs: tuple[str, ...]
@@ -30,6 +33,7 @@ class FitAnswer:
     report: dict[str, Any]
     miss_before: Array
     miss_after: Array
+    readings: tuple[ReadingLine, ...] = ()
 
     @property
     def before_um(self) -> float:
@@ -37,10 +41,12 @@ class FitAnswer:
         return 1000.0 * float(np.sqrt(np.mean(self.miss_before**2)))
 
 
-def identify(runs: tuple[str, ...], effects: tuple[str, ...] = ()) -> FitAnswer:
-    """Read runs and fit them; raises :class:`calib.errors.BadInput`."""
+def identify(
+    runs: tuple[str, ...], effects: tuple[str, ...] = (), masked: Sequence[str] = ()
+) -> FitAnswer:
+    """Read runs and fit them without the masked lines; raises BadInput."""
     rows, chosen = load_rows(runs, effects)
-    found = fit_effects(rows, chosen)
+    found = fit_effects(rows, chosen, masked_rows(rows, masked))
     remember_fit(found, runs)
     return answer_of(runs, found)
 
@@ -52,4 +58,4 @@ def answer_of(runs: tuple[str, ...], found: Fit) -> FitAnswer:
     after = np.linalg.norm(found.linear.residual[:, found.accepted], axis=0)
     effects = tuple(effect.id for effect in found.model.effects)
     said = {**fit_report(found), "record": plain_remarks(record_of(found))}
-    return FitAnswer(runs, effects, found, said, before, after)
+    return FitAnswer(runs, effects, found, said, before, after, tuple(lines_of_fit(found)))

@@ -296,6 +296,7 @@ class Desk:
 
         asked = Asked(
             model=model,
+            mask=self.study.masked,
             before=self.before.folder if self.before is not None else None,
             after=self.after.folder if self.after is not None else None,
             site=self.site,

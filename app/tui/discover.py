@@ -55,6 +55,13 @@ class DiscoverFace(Face):
             "View",
             tooltip="Show the next dependence; at 80 columns what is in the model",
         ),
+        Binding(
+            "e",
+            "app.show_side('residuals')",
+            "Residuals",
+            show=False,
+            tooltip="Reading by reading: what is left, where, and masking by hand",
+        ),
         Binding("s", "save", "Save", tooltip="Write the model to a file, for fit and apply"),
     ]
 
@@ -83,6 +90,7 @@ class DiscoverFace(Face):
             ("candidates", "Candidates"), ("found", "In the model"),
         ):  # fmt: skip
             self.query_one(f"#{name}").border_title = title
+        self.query_one("#fails").border_subtitle = "e: reading by reading"
 
     def show(self, picture: Picture) -> None:
         """Draw everything, but only when the search has moved."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from app.analysis import load_rows
+from app.analysis import load_rows, masked_rows
 from app.files.models import offered_effects
 from calib.discover.compare import compare_fit
 from calib.discover.compare_report import compare_report
@@ -59,14 +59,22 @@ class Search:
 
     @staticmethod
     def of(
-        runs: tuple[str, ...], effects: tuple[str, ...] = (), offers: Sequence[Path] = ()
+        runs: tuple[str, ...],
+        effects: tuple[str, ...] = (),
+        offers: Sequence[Path] = (),
+        masked: Sequence[str] = (),
     ) -> "Search":
-        """Load runs and look at the model with these effects; ``offers`` are candidates too."""
+        """Load runs and look at the model with these effects; ``offers`` are candidates too.
+
+        ``masked`` are lines of readings that are left out.
+        """
         rows, chosen = load_rows(runs, effects)
         # What the record itself shows is in the model from the start.
         candidates = (*catalogue(rows.machine), *offered_effects(offers, chosen), *chosen)
         known = {effect.id: effect for effect in candidates}
-        search = Search(runs, Refitter(rows, tuple(known.values())))
+        search = Search(
+            runs, Refitter(rows, tuple(known.values()), masked=masked_rows(rows, masked))
+        )
         names = tuple(effect.id for effect in chosen)
         search._climb("start", names)
         search._look(names)

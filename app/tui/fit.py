@@ -39,6 +39,12 @@ class FitFace(Face):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("f", "fit", "Fit", tooltip="Fit the run that is chosen, or the latest"),
         Binding("o", "choose", "Choose run", tooltip="Choose or type the runs to fit"),
+        Binding(
+            "e",
+            "app.show_side('residuals')",
+            "Residuals",
+            tooltip="Reading by reading: what is left, where, and masking by hand",
+        ),
         Binding("s", "save", "Save model", tooltip="Write what was found to a model file"),
     ]
 

@@ -24,6 +24,7 @@ from app.tui.fit import FitFace
 from app.tui.log import LogFace
 from app.tui.measure import MeasureFace
 from app.tui.painting import Painted
+from app.tui.residuals import ResidualsFace
 from app.tui.theme import BENCH
 from app.tui.verify import VerifyFace
 from app.tui.widgets.frame import STOP_KEY
@@ -34,6 +35,8 @@ from drivers.errors import DeviceError
 FACES: tuple[type[Face], ...] = (
     DevicesFace, MeasureFace, FitFace, DiscoverFace, ApplyFace, VerifyFace, LogFace,
 )  # fmt: skip
+SIDES: tuple[type[Face], ...] = (ResidualsFace,)
+"""Screens that are reached from others, and left with escape."""
 FORESEEN = (BadInput, DeviceError, GateRefused, OSError)
 
 
@@ -43,7 +46,7 @@ class Workbench(Painted[None]):
     CSS_PATH = "pkmcal.tcss"
     TITLE = "pkmcal"
     MODES: ClassVar[dict[str, str | Callable[[], Screen[Any]]]] = {
-        face.mode: face for face in FACES
+        face.mode: face for face in (*FACES, *SIDES)
     }
     DEFAULT_MODE = FACES[0].mode
     COMMAND_PALETTE_BINDING = "ctrl+p"
@@ -79,6 +82,7 @@ class Workbench(Painted[None]):
         self._ends_on_signals = ends_on_signals
         self._asked: PromptNeeded | None = None
         self._rung: PromptNeeded | None = None
+        self._came_from = self.DEFAULT_MODE
 
     def on_mount(self) -> None:
         """Open the site that the command line named, and begin to watch."""
@@ -168,6 +172,16 @@ class Workbench(Painted[None]):
         """Change to another screen."""
         self.switch_mode(mode)
 
+    def action_show_side(self, mode: str) -> None:
+        """Change to a screen that goes back to where it was called."""
+        if self.current_mode not in (face.mode for face in SIDES):
+            self._came_from = self.current_mode
+        self.switch_mode(mode)
+
+    def leave_side(self) -> None:
+        """Go back from such a screen."""
+        self.switch_mode(self._came_from)
+
     def action_hide_banner(self) -> None:
         """Take the banner away."""
         self.desk.picture.trouble = None
@@ -244,7 +258,7 @@ class Workbench(Painted[None]):
                 binding.description, f"{binding.tooltip} ({binding.key})",
                 lambda action=action: self.run_worker(self.run_action(action)),
             )  # fmt: skip
-        for face in FACES:
+        for face in (*FACES, *SIDES):
             for binding in bindings_of(face):
                 yield SystemCommand(
                     f"{face.label}: {binding.description}",
@@ -257,6 +271,8 @@ class Workbench(Painted[None]):
 
     def _caller(self, mode: str, action: str) -> Callable[[], None]:
         async def call() -> None:
+            if mode in (face.mode for face in SIDES):
+                self.action_show_side(mode)
             await self.switch_mode(mode)
             await self.run_action(action, self.screen)
 

@@ -31,6 +31,8 @@ class Study:
         self._thinking = False
         self.runs: tuple[str, ...] = ()
         self.effects: tuple[str, ...] = ()
+        self.masked: tuple[str, ...] = ()
+        """Lines of readings that the operator leaves out, as ``--mask`` takes them."""
         self.answer: FitAnswer | None = None
         self.search: Search | None = None
         self.offers: tuple[Path, ...] = ()
@@ -40,9 +42,21 @@ class Study:
         """Study other runs; what was found in the last ones is put aside."""
         if runs != self.runs:
             self.answer = self.search = None
-            self.effects = ()
+            self.effects = self.masked = ()
         self.runs = runs
         self._picture.revision += 1
+
+    def mask(self, line: str) -> None:
+        """Leave a reading out of the next fit, or take it back; it stays in its file.
+
+        The staircase begins anew with the next question: its steps are of other readings.
+        """
+        back = line in self.masked
+        self.masked = (
+            tuple(one for one in self.masked if one != line) if back else (*self.masked, line)
+        )
+        self.search = None
+        self._picture.write(f"line {line} {'taken back' if back else 'masked'}; f fits anew")
 
     def _chosen(self) -> tuple[str, ...]:
         if not self.runs:
@@ -65,12 +79,12 @@ class Study:
     async def identify(self) -> None:
         """Fit the chosen runs, or the latest; raises :class:`BadInput`."""
         runs = self._chosen()
-        effects = self.effects
+        effects, masked = self.effects, self.masked
 
         def work() -> "FitAnswer":
             from app.tui.analysis import identify
 
-            return identify(runs, effects)
+            return identify(runs, effects, masked)
 
         self._take(await self._think(work))
 
@@ -86,7 +100,7 @@ class Study:
     async def diagnose(self) -> None:
         """Ask what the model of the chosen runs misses, with the effects that are in it."""
         runs = self._chosen()
-        effects, offers = self.effects, self.offers
+        effects, offers, masked = self.effects, self.offers, self.masked
 
         before = self.search.stairs if self.search is not None else []
 
@@ -94,7 +108,7 @@ class Study:
             from app.tui.analysis import answer_of
             from app.tui.discovering import Search
 
-            found = Search.of(runs, effects, offers)
+            found = Search.of(runs, effects, offers, masked)
             if before:  # asked again: the way so far stands
                 found.stairs[:] = [*before, *(s for s in found.stairs[1:] if s not in before)]
             return found, answer_of(runs, found.present.run.fit)

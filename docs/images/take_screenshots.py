@@ -1,11 +1,13 @@
 """Take the pictures of docs/terminal-ui.md: the program, driven by keys, on a mock machine.
 
-python docs/images/take_screenshots.py        (about three minutes)
+python docs/images/take_screenshots.py              (all, about three minutes)
+python docs/images/take_screenshots.py analysis     (those on runs from the disk: seconds)
 """
 
 import asyncio
 import os
 import re
+import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -100,20 +102,31 @@ async def discover(photographer: Photographer) -> None:
     await photographer.keys("g")
     await photographer.until(lambda: len(study.effects) > 1)
     await photographer.picture("discover")
+    await photographer.keys("e")
+    await photographer.picture("residuals")
+    await photographer.keys("escape")
 
 
-async def main() -> None:
-    """Take all pictures, in a folder of its own."""
+async def job(photographer: Photographer) -> None:
+    """The pictures of the job, on the mock."""
+    await connect_and_measure(photographer)
+    await correct(photographer)
+
+
+PARTS = {"job": job, "analysis": discover}
+
+
+async def main(parts: list[str]) -> None:
+    """Take the pictures of some parts, in a folder of its own."""
     with tempfile.TemporaryDirectory() as folder:
         os.environ["PKMCAL_STATE"] = str(Path(folder) / "state")
         bench = Workbench(root=Path(folder) / "sessions")
         async with bench.run_test(size=SIZE) as pilot:
             photographer = Photographer(bench, pilot)
-            await connect_and_measure(photographer)
-            await correct(photographer)
-            await discover(photographer)
+            for part in parts:
+                await PARTS[part](photographer)
             await bench.desk.close()
 
 
 if __name__ == "__main__":
-    asyncio.run(main())
+    asyncio.run(main(sys.argv[1:] or list(PARTS)))

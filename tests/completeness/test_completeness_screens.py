@@ -4,12 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from app.tui.program import FACES
+from app.tui.program import FACES, SIDES
 
 DOCS = Path(__file__).parents[2] / "docs"
+SCREENS = (*FACES, *SIDES)
 
 
-@pytest.mark.parametrize("face", FACES, ids=[face.mode for face in FACES])
+@pytest.mark.parametrize("face", SCREENS, ids=[face.mode for face in SCREENS])
 def test_completeness_screen_has_a_picture_that_is_taken_and_shown(face: type) -> None:
     mode = face.mode
     assert (DOCS / "images" / f"{mode}.svg").is_file()
@@ -20,7 +21,7 @@ def test_completeness_screen_has_a_picture_that_is_taken_and_shown(face: type) -
 
 def test_completeness_screens_have_names_of_their_own_and_say_what_they_are_for() -> None:
     for each in ("mode", "label", "about"):
-        said = [getattr(face, each) for face in FACES]
+        said = [getattr(face, each) for face in SCREENS]
         assert all(said)
         assert len(set(said)) == len(said)
 

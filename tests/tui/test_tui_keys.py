@@ -11,7 +11,7 @@ from textual.widgets import Input
 
 from app.tui.dialogs import Ask, Choose, Enter, Help, choice_keys
 from app.tui.face import Face
-from app.tui.program import FACES, Workbench, bindings_of
+from app.tui.program import FACES, SIDES, Workbench, bindings_of
 from app.tui.widgets.frame import Banner, TopLine
 from calib.errors import BadInput
 
@@ -164,7 +164,7 @@ async def test_unknown_site_file_is_named(bench: Workbench, tmp_path: Path) -> N
 async def test_every_action_is_in_the_palette_with_its_key(bench: Workbench) -> None:
     async with bench.run_test(size=(80, 24)):
         titles = {command.title for command in bench.get_system_commands(bench.screen)}
-        for face in FACES:
+        for face in (*FACES, *SIDES):
             for binding in bindings_of(face):
                 assert f"{face.label}: {binding.description}" in titles
         assert {"STOP", "Quit", "Help"} <= titles
@@ -172,7 +172,7 @@ async def test_every_action_is_in_the_palette_with_its_key(bench: Workbench) -> 
 
 def test_every_key_is_explained_and_none_is_used_twice_on_a_screen() -> None:
     everywhere = [binding.key for binding in bindings_of(Workbench)]
-    for face in FACES:
+    for face in (*FACES, *SIDES):
         keys = [binding.key for binding in bindings_of(face)] + everywhere
         assert len(keys) == len(set(keys)), (face, keys)
         assert all(binding.tooltip and binding.description for binding in bindings_of(face))

@@ -9,7 +9,7 @@ import tui_stream as stream
 from textual.pilot import Pilot
 
 from app.session.events import WriteBackStage
-from app.tui.program import FACES, Workbench
+from app.tui.program import FACES, SIDES, Workbench
 
 SIZES = [(80, 24), (160, 48)]
 
@@ -40,6 +40,17 @@ def test_screen(snap_compare: Look, tmp_path: Path, number: int, size: tuple[int
     async def show(pilot: Pilot[Any]) -> None:
         await full(pilot, tmp_path)
         await pilot.press(str(number))
+        await pilot.pause(0.5)
+
+    assert snap_compare(Workbench(root=tmp_path), terminal_size=size, run_before=show)
+
+
+@pytest.mark.parametrize("size", SIZES, ids=["80x24", "160x48"])
+@pytest.mark.parametrize("mode", [face.mode for face in SIDES])
+def test_side_screen(snap_compare: Look, tmp_path: Path, mode: str, size: tuple[int, int]) -> None:
+    async def show(pilot: Pilot[Any]) -> None:
+        bench = await full(pilot, tmp_path)
+        bench.action_show_side(mode)
         await pilot.pause(0.5)
 
     assert snap_compare(Workbench(root=tmp_path), terminal_size=size, run_before=show)

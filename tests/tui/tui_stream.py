@@ -16,6 +16,7 @@ from app.tui.analysis import FitAnswer
 from app.tui.correction import Comparison
 from app.tui.discovering import Search, Stair, View
 from app.tui.program import Workbench
+from app.tui.reading_lines import ReadingLine
 from app.tui.verifying import Verified
 from app.verification import Verification
 from app.writeback.proposal import Change, Proposal
@@ -286,5 +287,28 @@ def fitted() -> FitAnswer:
     generator = np.random.default_rng(3)
     before, after = np.abs(generator.normal(0.0, [[0.25], [0.006]], (2, 95)))
     return FitAnswer(
-        ("sessions/20261122-0800-hexapod-measure/run",), (), None, report, before, after
+        ("sessions/20261122-0800-hexapod-measure/run",), (), None, report, before, after, readings()
     )
+
+
+def readings() -> tuple[ReadingLine, ...]:
+    """What a fit leaves of 90 readings and two of the base; the errors turn round an upright axis.
+
+    One was masked by hand.
+    """
+    generator = np.random.default_rng(7)
+    lines = []
+    for number in range(1, 93):
+        base = number > 90
+        x, y, z = generator.uniform((-60, -60, 190), (60, 60, 250))
+        dx, dy, dz = generator.normal((-0.1 * y, 0.1 * x, 0.0), 2.0)
+        size = math.hypot(dx, dy, dz)
+        nest = "b1" if base else str(3 + number % 3)
+        left_out = "masked by the operator" if number == 17 else ""
+        lines.append(
+            ReadingLine(
+                number, str(number + 1), number + 1, "" if base else f"p{(number + 2) // 3:02d}",
+                nest, not base, (dx, dy, dz), size, size / 3.0, (x, y, z), left_out,
+            )
+        )  # fmt: skip
+    return tuple(lines)
