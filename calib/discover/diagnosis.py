@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from calib.arrays import Array, BoolArray
-from calib.discover.problem import effect_candidates, quadratics_of, variables_of
+from calib.discover.problem import effect_candidates, products_of, quadratics_of, variables_of
 from calib.effects.component import Effect
 from calib.evidence.candidate import Candidate
 from calib.evidence.diagnosis import diagnose
@@ -126,10 +126,11 @@ def diagnose_fit(
     rows = fitted.model.rows
     problem = fitted.problem
     columns = effect_columns(fitted, catalogue)
+    variables = [*variables_of(fitted), *products_of(fitted)]
     answer = diagnose(
         problem,
         effect_candidates(fitted, problem, columns),
-        [_freed(fitted, one) for one in structure_candidates(variables_of(fitted))],
+        [_freed(fitted, one) for one in structure_candidates(variables)],
         quadratics_of(fitted),
         rng=generator,
     )

@@ -17,6 +17,8 @@ from calib.identify.fitting import Fit
 from calib.identify.signatures import EffectColumns
 from calib.mechanism.rigid import rotate, to_euler
 
+TIMES_Q = " times q"
+"""What moves along with an actuator's own coordinate, in the name of what is moved."""
 MANY = 400
 """Periods in time that are tried at most for what moves all points alike."""
 
@@ -99,6 +101,27 @@ def variables_of(fit: Fit) -> list[Variable]:
     ]
     coordinates = np.concatenate([situation.position, to_euler(situation.rotation)])
     found += [Variable("pose", _rows_of(fit, values), (legs,)) for values in coordinates]
+    return found
+
+
+def products_of(fit: Fit) -> list[Variable]:
+    """Gains of the actuators that change with a column or with time: the product of both.
+
+    No function of one variable shows them; each visit of a pose at another temperature, load or
+    time would seem to err by chance.
+    """
+    rows, legs = fit.model.rows, every_leg(fit)
+    gains = Response(f"{legs.name}{TIMES_Q}", legs.columns, legs.unit, legs.size)
+    changing = {"time_s": rows.time_s, **rows.channels}
+    found = []
+    for name, values in changing.items():
+        kept = values[fit.accepted]
+        if not np.isfinite(kept).all() or np.ptp(kept) == 0.0:
+            continue
+        middle = 0.5 * (kept.min() + kept.max())
+        found.append(
+            Variable(name, _rows_of(fit, rows.extension * (values - middle)), (gains,), ("linear",))
+        )
     return found
 
 

@@ -17,6 +17,7 @@ from calib.discover.diagnosis import RunDiagnosis
 from calib.discover.discovery import stage_of
 from calib.discover.likeness import likeness_of, likeness_of_found, likeness_words
 from calib.discover.noise_report import noise_report, noise_words
+from calib.discover.problem import TIMES_Q
 from calib.effects import not_defined
 from calib.evidence.findings import Diagnosis, Finding
 from calib.evidence.forward import WEAK, Discovery, hints
@@ -233,8 +234,9 @@ def _of_physics(
     if poses < FEW_POSES:
         named = "one pose" if poses == 1 else f"{poses} poses"
         excluded += f" With {named} only large effects would show: measure more."
-    scatter = untrue_uncertainties(found.fit)
     told = noise_words(found)
+    of_noise = told and all(one.name != "scale" for one in found.noise.components)
+    scatter = "" if of_noise else untrue_uncertainties(found.fit)
     if told:
         excluded = f" As to noise: {told}.{excluded}"
     if hinted := _hinted(found):
@@ -306,6 +308,8 @@ def _depends(diagnosis: Diagnosis) -> str:
     channel, period = strongest[0].channel, strongest[0].period
     if channel == "pose":
         return "it depends on the pose"
+    if strongest[0].carrier.endswith(TIMES_Q):
+        return f"it depends on {channel} times q, as if the actuators' gain changed with it"
     if period is None:
         return f"it depends on {channel}"
     if channel != "time_s":

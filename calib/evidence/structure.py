@@ -25,7 +25,7 @@ MOST_PERIODS = 48
 MOST_NUMBERS = 10_000_000
 """Numbers in the columns of one variable beyond which fewer periods are tried."""
 
-Kind = Literal["smooth", "levels", "periodic"]
+Kind = Literal["smooth", "linear", "levels", "periodic"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Variable:
         a value of its own (direction of approach of each actuator).
     responses : tuple of Response
         What it may act on; each makes a candidate.
-    kinds : tuple of "smooth", "levels", "periodic"
+    kinds : tuple of "smooth", "linear", "levels", "periodic"
     shortest : float, optional
         Shortest period that is tried; default twice the median distance of distinct values.
     most_periods : int
@@ -84,7 +84,9 @@ def structure_candidates(variables: Sequence[Variable]) -> list[Candidate]:
         for response in variable.responses:
             for kind in variable.kinds:
                 if kind == "smooth":
-                    found.append(_smooth(variable, response))
+                    found.append(_smooth(variable, response, ORDER))
+                elif kind == "linear":
+                    found.append(_smooth(variable, response, 1))
                 elif kind == "levels":
                     found.append(_levels(variable, response))
                 else:
@@ -92,11 +94,11 @@ def structure_candidates(variables: Sequence[Variable]) -> list[Candidate]:
     return found
 
 
-def _smooth(variable: Variable, response: Response) -> Candidate:
+def _smooth(variable: Variable, response: Response, most: int) -> Candidate:
     """Polynomials up to the order that the distinct values allow; lower orders stand alone too."""
     values = np.broadcast_to(variable.values, response.columns.shape)
     distinct = min(np.unique(row).size for row in values)
-    order = max(1, min(ORDER, distinct - 1))
+    order = max(1, min(most, distinct - 1))
     low, high = variable.values.min(), variable.values.max()
     shapes = _legendre(2.0 * (values - low) / (high - low) - 1.0, order)
     columns = (shapes * response.columns).reshape(1, -1, response.columns.shape[1])
