@@ -20,9 +20,11 @@ from app.session.plan import Plan
 from app.session.session import Outcome, Session
 from app.session.station import Station
 from app.tui.correction import KEEP, Corrections
+from app.tui.history_view import LookingBack
 from app.tui.picture import Picture
 from app.tui.study import Study
 from app.tui.verifying import Verified, verification_plan, verified
+from app.tui.watching import Watching
 from drivers.errors import ConnectFailed, DeviceError, Silence
 
 _Answer = TypeVar("_Answer")
@@ -54,6 +56,8 @@ class Desk:
         self.corrections = Corrections(self)
         self._connecting = False
         self.study = Study(root, self.picture)
+        self.past = LookingBack(root, self.picture)
+        self.watched: Watching | None = None
         self.before: Verified | None = None
         self.after: Verified | None = None
         self.done: set[str] = set()
@@ -260,6 +264,16 @@ class Desk:
         elif session.plan.purpose == "measure":
             self.study.choose((str(outcome.run_folder),))
         return outcome
+
+    # what became of it
+
+    async def look_back(self) -> None:
+        """Read the history of this folder; the machine that is connected is shown first."""
+        serial = ""
+        if self.connected and self.station is not None:
+            serial = self.station.controller.identity.serial
+        tolerance = self.site.record.tolerance_um if self.site is not None else None
+        await self.past.look(serial, tolerance)
 
     # what it is worth
 

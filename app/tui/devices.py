@@ -39,8 +39,23 @@ class DevicesFace(Face):
         Binding("m", "mock", "Mock", tooltip="Start a mock machine with its tracker"),
         Binding("c", "connect", "Connect", tooltip="Connect to the devices, or let them go"),
         Binding("e", "power", "Drives", tooltip="Switch the drives' power"),
-        Binding("t", "try", "Try", tooltip="Look at the mystery run: what is wrong with it?"),
-        Binding("f", "clear_faults", "Clear faults", tooltip="Reset standing drive faults"),
+        Binding(
+            "a",
+            "app.show_side('watch')",
+            "Watch",
+            show=False,
+            tooltip="Watch a session that another terminal runs, read-only",
+        ),
+        Binding(
+            "t", "try", "Try", show=False, tooltip="Look at the mystery run: what is wrong with it?"
+        ),
+        Binding(
+            "h",
+            "app.show_side('history')",
+            "History",
+            tooltip="What became of this machine: sets, fits, verifications, drifts",
+        ),
+        Binding("f", "clear_faults", "Reset", tooltip="Reset standing drive faults"),
     ]
 
     def __init__(self) -> None:

@@ -53,9 +53,12 @@ class LogLines(ScrollView, can_focus=True):
         self.only_warnings = False
         self._rows: list[tuple[LogLine, str]] = []
         self._made_of: tuple[int, bool, int] | None = None
+        self._picture: Picture | None = None
 
     def show(self, picture: Picture) -> None:
         """Wrap what is new; nothing is done if nothing is."""
+        if picture is not self._picture:
+            self._picture, self._made_of = picture, None
         made_of = (picture.logged, self.only_warnings, self._width)
         if made_of == self._made_of or not self._width:
             return
@@ -79,7 +82,8 @@ class LogLines(ScrollView, can_focus=True):
     def on_resize(self) -> None:
         """Wrap for the new width at the next drawing."""
         self._made_of = None
-        self.call_after_refresh(lambda: self.show(self.screen.desk.picture))  # type: ignore[attr-defined]
+        if self._picture is not None:
+            self.call_after_refresh(self.show, self._picture)
 
     def _wrapped(self, line: LogLine) -> list[str]:
         sign, _ = LEVELS[line.level]

@@ -21,12 +21,14 @@ from app.tui.dialogs import Ask, Choose, Help
 from app.tui.discover import DiscoverFace
 from app.tui.face import Face
 from app.tui.fit import FitFace
+from app.tui.history import HistoryFace
 from app.tui.log import LogFace
 from app.tui.measure import MeasureFace
 from app.tui.painting import Painted
 from app.tui.residuals import ResidualsFace
 from app.tui.theme import BENCH
 from app.tui.verify import VerifyFace
+from app.tui.watch import WatchFace
 from app.tui.widgets.frame import STOP_KEY
 from app.tui.wording import said
 from calib.errors import BadInput
@@ -35,7 +37,7 @@ from drivers.errors import DeviceError
 FACES: tuple[type[Face], ...] = (
     DevicesFace, MeasureFace, FitFace, DiscoverFace, ApplyFace, VerifyFace, LogFace,
 )  # fmt: skip
-SIDES: tuple[type[Face], ...] = (ResidualsFace,)
+SIDES: tuple[type[Face], ...] = (ResidualsFace, HistoryFace, WatchFace)
 """Screens that are reached from others, and left with escape."""
 FORESEEN = (BadInput, DeviceError, GateRefused, OSError)
 
@@ -178,7 +180,7 @@ class Workbench(Painted[None]):
             self._came_from = self.current_mode
         self.switch_mode(mode)
 
-    def leave_side(self) -> None:
+    def action_leave_side(self) -> None:
         """Go back from such a screen."""
         self.switch_mode(self._came_from)
 

@@ -41,7 +41,7 @@ class ResidualsFace(Face):
         Binding("w", "order", "Order", tooltip="The largest first, or as they were read"),
         Binding("v", "view", "View", tooltip="Readings, or their pictures, at 80 columns"),
         Binding("p", "plane", "Plane", tooltip="Look at the workspace from another side"),
-        Binding("escape", "back", "Back", tooltip="Back to where you came from"),
+        Binding("escape", "app.leave_side", "Back", tooltip="Back to where you came from"),
     ]  # fmt: skip
 
     def __init__(self) -> None:
@@ -137,10 +137,6 @@ class ResidualsFace(Face):
         """Look from the next side."""
         self._plane = (self._plane + 1) % len(PLANES)
         self.draw()
-
-    def action_back(self) -> None:
-        """Go back."""
-        self.bench.leave_side()
 
 
 class VectorPanel(Static):

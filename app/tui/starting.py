@@ -47,6 +47,12 @@ def start_text(steps: list[JobStep], recent: list[SessionFacts]) -> Content:
         for number, step in enumerate(steps, start=1)
     ]
     if recent:
-        lines += [Content(""), Content.from_markup("[dim]last sessions[/]")]
+        lines.append(Content(""))
+        lines.append(
+            Content.from_markup(
+                "[dim]last sessions;[/]  [bold $accent]a[/] watches one that another terminal "
+                "runs,  [bold $accent]h[/] looks back"
+            )
+        )
         lines += [Content(session_words(facts)) for facts in recent]
     return Content("\n").join(lines)

@@ -41,8 +41,14 @@ class VerifyFace(Face):
     AUTO_FOCUS: ClassVar[str | None] = "#verify-table"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("v", "verify", "Verify", tooltip="Measure the verification poses"),
-        Binding("o", "before", "Choose before", tooltip="Choose an earlier verification"),
+        Binding("o", "before", "Before", tooltip="Choose an earlier verification"),
         Binding("p", "record", "Record", tooltip="Write the calibration record, HTML and PDF"),
+        Binding(
+            "h",
+            "app.show_side('history')",
+            "History",
+            tooltip="What became of this machine: sets, fits, verifications, drifts",
+        ),
         Binding("w", "worst", "Worst first", tooltip="Sort by the error, or by the path"),
     ]
 

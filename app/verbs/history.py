@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 import click
 
 from app import answer
+from app.report.history_words import clock, drift_words
 from app.report.words import with_uncertainty
-from app.verbs.sessions import clock
 
 if TYPE_CHECKING:
-    from app.jobs.looking_back import DriftEntry, MachineEntry, SeriesEntry
+    from app.jobs.looking_back import MachineEntry, SeriesEntry
 
 
 @click.command()
@@ -84,15 +84,3 @@ def _row(one: "SeriesEntry") -> tuple[str, ...]:
         with_uncertainty(one.values[-1], one.sigmas[-1])[0], change, sigma, one.unit,
         f"{one.p_value:.1g}",
     )  # fmt: skip
-
-
-def drift_words(found: "DriftEntry", unit: str) -> str:
-    """``2.1 +- 0.4 um a month; out of tolerance in about 5 months``."""
-    scale, unit = (1e3, "um") if unit == "mm" else (1.0, unit)
-    rate, sigma = with_uncertainty(scale * found.rate, scale * found.sigma)
-    said = f"{rate} +- {sigma} {unit} a month"
-    if found.months is None:
-        return said
-    if found.months < 1.0:
-        return f"{said}; out of tolerance within a month"
-    return f"{said}; out of tolerance in about {found.months:.0f} months"

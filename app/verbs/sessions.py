@@ -1,12 +1,12 @@
 """List the sessions of a folder: state, machine, title"""
 
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from app import answer
+from app.report.history_words import clock
 
 if TYPE_CHECKING:
     from app.jobs.listing import SessionEntry
@@ -36,8 +36,3 @@ def _row(one: "SessionEntry", width: int) -> tuple[str, ...]:
         one.folder, clock(one.begun_utc), one.purpose, state, machine, str(one.poses),
         str(one.readings), one.title.ljust(width),
     )  # fmt: skip
-
-
-def clock(utc: str) -> str:
-    """A moment by the clock of this computer: ``2026-11-29 07:14``."""
-    return f"{datetime.fromisoformat(utc).astimezone():%Y-%m-%d %H:%M}" if utc else "?"

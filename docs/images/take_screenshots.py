@@ -88,8 +88,20 @@ async def correct(photographer: Photographer) -> None:
     await photographer.keys("6", "v", "q")
     await photographer.until(lambda: desk.before is not None)
     await photographer.picture("verify")
+    await look_back(photographer)
     await photographer.keys("7")
     await photographer.picture("log")
+
+
+async def look_back(photographer: Photographer) -> None:
+    """What the folder holds by now."""
+    await photographer.keys("h")
+    await photographer.picture("history")
+    await photographer.keys("escape", "1", "a", "enter")
+    await photographer.until(lambda: photographer.bench.desk.watched is not None)
+    await photographer.pilot.pause(1.0)
+    await photographer.picture("watch")
+    await photographer.keys("escape")
 
 
 async def discover(photographer: Photographer) -> None:

@@ -1,6 +1,7 @@
 """Every screen and dialog at both sizes, as it looks: fixed theme, fixed events."""
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,20 @@ from textual.pilot import Pilot
 
 from app.session.events import WriteBackStage
 from app.tui.program import FACES, SIDES, Workbench
+from app.tui.watching import Watching
 
 SIZES = [(80, 24), (160, 48)]
+
+
+@pytest.fixture
+def utc(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Clocks of these pictures show UTC, wherever they are taken."""
+    with monkeypatch.context() as there:
+        there.setenv("TZ", "UTC")
+        time.tzset()
+        yield
+    time.tzset()
+
 
 Look = Callable[..., bool]
 
@@ -47,11 +60,16 @@ def test_screen(snap_compare: Look, tmp_path: Path, number: int, size: tuple[int
 
 @pytest.mark.parametrize("size", SIZES, ids=["80x24", "160x48"])
 @pytest.mark.parametrize("mode", [face.mode for face in SIDES])
-def test_side_screen(snap_compare: Look, tmp_path: Path, mode: str, size: tuple[int, int]) -> None:
+def test_side_screen(
+    snap_compare: Look, tmp_path: Path, mode: str, size: tuple[int, int], utc: None
+) -> None:
+    stream.remember(tmp_path)
+
     async def show(pilot: Pilot[Any]) -> None:
         bench = await full(pilot, tmp_path)
+        bench.desk.watched = Watching(stream.begun_elsewhere(tmp_path))
         bench.action_show_side(mode)
-        await pilot.pause(0.5)
+        await pilot.pause(1.2)
 
     assert snap_compare(Workbench(root=tmp_path), terminal_size=size, run_before=show)
 

@@ -1,13 +1,17 @@
 """A recorded stream of a session's events, and what else the screens need to be looked at."""
 
 import math
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 
-from app.files.site import Site
+from app.files.site import Site, load_site
+from app.history.store import Entry, History
 from app.session import events as ev
 from app.session import kinds
+from app.session.folder import make_folder
+from app.session.journal import IDENTITIES, Journal
 from app.session.known import Snapshot
 from app.session.plan import Plan
 from app.session.plans import PlanOptions, measure_plan
@@ -289,6 +293,41 @@ def fitted() -> FitAnswer:
     return FitAnswer(
         ("sessions/20261122-0800-hexapod-measure/run",), (), None, report, before, after, readings()
     )
+
+
+def remember(folder: Path) -> None:
+    """Five calibrations, a month apart: leg 3 grows, leg 1 was hit before the last one."""
+    generator = np.random.default_rng(12)
+    begun = datetime(2026, 1, 5, 8, tzinfo=UTC)
+    for month in range(5):
+        values = {f"leg{leg}.{name}": 100.0 + leg for leg in range(1, 7) for name in ("B_x", "L0")}
+        values["leg3.L0"] += 0.003 * month
+        values["leg1.L0"] += 0.06 * (month == 4)
+        found = [
+            {"name": n, "value": v + generator.normal(0.0, 0.0005), "sigma": 5e-4, "unit": "mm"}
+            for n, v in values.items()
+        ]
+        said = {"runs": [f"run{month}"], "effects": [], "rms_um": 6.0, "parameters": found}
+        utc = (begun + timedelta(days=30 * month)).isoformat()
+        History(folder).add(Entry("fit", utc, "hexapod", "1001", f"run{month}", said))
+
+
+def begun_elsewhere(folder: Path) -> Path:
+    """A session that another terminal has brought to its sixth step."""
+    (folder / "site.toml").write_text(SITE, encoding="utf-8")
+    site = load_site(folder / "site.toml")
+    plan = plan_of(site, 3)
+    there = make_folder(folder / "elsewhere", site, plan)
+    journal = Journal(there / "journal.sqlite")
+    journal.set_meta(IDENTITIES, {"controller": {"serial": "1001"}})
+    for number, step in enumerate(plan.steps[:6]):
+        utc = f"2026-11-29T06:00:{number:02d}.000+00:00"
+        journal.started(step.id, 1, float(number), utc)
+        if number < 5:
+            journal.done(step.id, 1, float(number), utc, {})
+    journal.note("answer", "done", 6.0, "2026-11-29T06:00:06.000+00:00")
+    journal.close()
+    return there
 
 
 def readings() -> tuple[ReadingLine, ...]:

@@ -132,6 +132,28 @@ class PairPlot(QuietPlot):
         )
 
 
+class SeriesPlot(QuietPlot):
+    """One quantity over days, with its uncertainty."""
+
+    def show(
+        self, name: str, unit: str, days: Array, values: Array, sigmas: Array, key: object
+    ) -> None:
+        """Draw values (N,) with sigmas (N,) over days (N,), 0 being the last; um where it is mm."""
+        if not self.changed(key):
+            return
+        self.clear()
+        scale, unit = (1e3, "µm") if unit == "mm" else (1.0, unit)
+        middle = float(values[-1]) if scale == 1e3 else 0.0
+        y, sigma = scale * (values - middle), scale * sigmas
+        low, high = float(np.min(y - sigma)), float(np.max(y + sigma))
+        room = 0.1 * (high - low) or 1.0
+        self.set_ylimits(low - room, high + room)
+        self.set_xlimits(*around(float(days[0]), float(days[-1])))
+        self.errorbar(days, y, yerr=sigma, marker="o", marker_style="#e8b45a")
+        against = " against the last" if middle else ""
+        self.border_title = f"{name}, {unit}{against}, over days"
+
+
 class Decades(NumericAxisFormatter):
     """Labels an axis of logarithms with the numbers themselves."""
 
