@@ -33,9 +33,10 @@ CHECKS = (
 
 def ensure_environment(extra: str) -> None:
     """Create the environment and install the pinned packages, unless that is done already."""
+    built_from = [ROOT / "pyproject.toml", ROOT / "constraints.txt"]
+    built_from += sorted((ROOT / "calib" / "mechanism" / "core").iterdir())
     wanted = hashlib.sha256(
-        b"".join((ROOT / name).read_bytes() for name in ("pyproject.toml", "constraints.txt"))
-        + sys.version.encode()
+        b"".join(path.read_bytes() for path in built_from) + sys.version.encode()
     ).hexdigest()
     stamp = ENVIRONMENT / f"installed-{extra or 'base'}"
     if PYTHON.exists() and stamp.exists() and stamp.read_text() == wanted:

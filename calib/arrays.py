@@ -8,6 +8,8 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.intp]
+CIntArray = npt.NDArray[np.intc]
+"""Integers as C has them: tables, and pairs of indices."""
 Numbers = npt.NDArray[Any]
 """Real, or complex where a derivative is checked by complex step."""
 

@@ -1,8 +1,9 @@
-"""A first guess of the pose from the home configuration, to second order in the extensions.
+"""A first guess from the home configuration, to second order in what is asked.
 
 Every forward solution that starts at home would begin with the same linearisation. Its answer,
 and the curvature behind it, are worked out once for a machine from solutions near home; a guess
-then costs one matrix product. It only starts Newton: the result does not depend on it.
+then costs one matrix product. It only starts Newton: the result does not depend on it. The
+compiled core guesses in the same way, and for an inverse that goes limb by limb as well.
 """
 
 from dataclasses import dataclass
@@ -11,7 +12,8 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray
 from calib.mechanism.description import Machine
-from calib.mechanism.rigid import exponential, logarithm, product
+from calib.mechanism.rigid import Poses, exponential, logarithm, product
+from calib.mechanism.tables import passive_units
 
 PROBE = 0.02
 """Distance of the probes from home, as a part of each stroke."""
@@ -26,7 +28,23 @@ def _pairs(n: int) -> list[tuple[int, int]]:
 def probe_steps(machine: Machine) -> Array:
     """Extensions relative to home (n, n (n + 3) / 2): + and - each actuator, + each pair."""
     low, high = machine.q_limits.T
-    h = PROBE * (high - low)
+    return _probes(PROBE * (high - low))
+
+
+def pose_probes(home: Poses, size: float) -> tuple[Array, Poses]:
+    """Small steps (6, 27) of the pose about ``home`` (one pose), and the poses that they lead to.
+
+    A step is the way of the origin over ``size``, and the rotation vector to first order
+    (:func:`calib.mechanism.rigid.small_rotation`).
+    """
+    steps = _probes(np.full(6, PROBE))
+    sine = np.sqrt(np.sum(steps[3:] ** 2, axis=0))
+    turned = np.where(sine > 0.0, np.arcsin(sine) / np.where(sine > 0.0, sine, 1.0), 1.0)
+    rotation = product(exponential(steps[3:] * turned), home.rotation)
+    return steps, Poses(home.position + steps[:3] * size, rotation)
+
+
+def _probes(h: Array) -> Array:
     n = len(h)
     pairs = _pairs(n)
     steps = np.zeros((n, 2 * n + len(pairs)))
@@ -35,6 +53,18 @@ def probe_steps(machine: Machine) -> Array:
     for k, (i, j) in enumerate(pairs):
         steps[[i, j], 2 * n + k] = h[[i, j]]
     return steps
+
+
+def coefficients(steps: Array, y: Array) -> tuple[Array, Array]:
+    """Linear (m, n) and quadratic (m, n (n + 1) / 2) answers, from y (m, ...) at the probes."""
+    n = len(steps)
+    h = np.diag(steps[:, :n])
+    plus, minus, pairs = y[:, :n], y[:, n : 2 * n], y[:, 2 * n :]
+    quadratic = [0.5 * (plus + minus) / h**2]
+    for k, (i, j) in enumerate(_pairs(n)):
+        mixed = pairs[:, k] - plus[:, i] - plus[:, j]
+        quadratic.append((mixed / (h[i] * h[j]))[:, None])
+    return 0.5 * (plus - minus) / h, np.concatenate(quadratic, axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,22 +102,14 @@ class Extrapolation:
                 probes[2] - passive,
             ]
         )
-        steps = probe_steps(machine)
-        n = len(steps)
-        h = np.diag(steps[:, :n])
-        plus, minus, pairs = y[:, :n], y[:, n : 2 * n], y[:, 2 * n :]
-        quadratic = [0.5 * (plus + minus) / h**2]
-        for k, (i, j) in enumerate(_pairs(n)):
-            mixed = pairs[:, k] - plus[:, i] - plus[:, j]
-            quadratic.append((mixed / (h[i] * h[j]))[:, None])
-        lengths = [1.0 if joint.turns else machine.size for joint in machine.joints]
+        linear, quadratic = coefficients(probe_steps(machine), y)
         return cls(
             position,
             rotation,
             passive,
-            0.5 * (plus - minus) / h,
-            np.concatenate(quadratic, axis=1),
-            np.concatenate([np.ones(6), lengths])[:, None],
+            linear,
+            quadratic,
+            np.concatenate([np.ones(6), passive_units(machine)])[:, None],
             machine.size,
         )
 

@@ -14,6 +14,7 @@ from calib.arrays import Numbers
 from calib.mechanism.closure import Closure, Standing
 from calib.mechanism.description import Kind, Machine
 from calib.mechanism.householder import Reflectors
+from calib.mechanism.kernel import kernel_of
 from calib.mechanism.newton import platform_solver
 from calib.mechanism.solve import CHUNK, Configuration
 
@@ -42,11 +43,14 @@ def pose_jacobians(
     parameters : array, shape (P,) or (P, N), optional
         Nominal if not given.
     """
-    count = configuration.count
-    dtype = np.result_type(_held(machine, parameters), configuration.poses.position)
+    count, held = configuration.count, _held(machine, parameters)
+    kernel = kernel_of(machine, held, configuration.poses.position)
+    if kernel is not None:
+        return PoseJacobians(*kernel.jacobians(held, configuration))
+    dtype = np.result_type(held, configuration.poses.position)
     by_parameter = np.zeros((len(machine.parameters), 6, count), dtype=dtype)
     by_actuator = np.zeros((len(machine.actuators), 6, count), dtype=dtype)
-    for part, closure, inverse_rows in _linearised(machine, configuration, parameters):
+    for part, closure, inverse_rows in _linearised(machine, configuration, held):
         _fill(closure, "parameter", inverse_rows, by_parameter[:, :, part])
         _fill(closure, "actuator", inverse_rows, by_actuator[:, :, part])
     return PoseJacobians(by_parameter, by_actuator)
@@ -68,9 +72,13 @@ def element_twists(
     places : sequence of (limb, element)
         Indices in ``machine.limbs`` and in that limb's chain.
     """
-    dtype = np.result_type(_held(machine, parameters), configuration.poses.position)
+    held = _held(machine, parameters)
+    kernel = kernel_of(machine, held, configuration.poses.position)
+    if kernel is not None:
+        return kernel.element_twists(held, configuration, places)
+    dtype = np.result_type(held, configuration.poses.position)
     twists = np.zeros((len(places), 6, configuration.count), dtype=dtype)
-    for part, closure, inverse_rows in _linearised(machine, configuration, parameters):
+    for part, closure, inverse_rows in _linearised(machine, configuration, held):
         for own, (limb, element) in zip(twists, places, strict=True):
             rows, answer = closure.column(limb, element)
             own[:, part] = np.einsum("irn,rn->in", inverse_rows[:, rows], answer)
@@ -83,10 +91,10 @@ def _held(machine: Machine, parameters: Numbers | None) -> Numbers:
 
 
 def _linearised(
-    machine: Machine, configuration: Configuration, parameters: Numbers | None
+    machine: Machine, configuration: Configuration, held: Numbers
 ) -> Iterator[tuple[slice, Closure, Numbers]]:
     """Poses a chunk at a time: closure, and twist (6, m, N) per unit of each of its rows."""
-    held, standing = _held(machine, parameters), Standing.of(configuration)
+    standing = Standing.of(configuration)
     for first in range(0, configuration.count, CHUNK):
         part = slice(first, min(first + CHUNK, configuration.count))
         own = held if held.shape[1] == 1 else held[:, part]

@@ -12,6 +12,7 @@ from calib.mechanism.description import Machine
 from calib.mechanism.householder import Reflectors, factorise
 from calib.mechanism.redundant import extension_steps
 from calib.mechanism.rigid import Poses, exponential, product
+from calib.mechanism.tables import actuator_units
 from calib.mechanism.task import task_error, task_rows
 
 MAX_ITERATIONS = 60
@@ -80,7 +81,7 @@ class Newton:
             held, gaps = closure.rows()
             strained = np.einsum("rin,in->rn", held, dx) + gaps
             straining = np.einsum("rin,ian->ran", held, D) - answers
-            ds = extension_steps(answer, error, strained, straining, self._units())
+            ds = extension_steps(answer, error, strained, straining, actuator_units(self.machine))
         else:
             inner = factorise(answer)
             ds = inner.solve_triangle(inner.apply_transposed(error))
@@ -108,21 +109,14 @@ class Newton:
         """Damping (N,) that bounds the step, and the size of the undamped step (N,)."""
         size = np.max(np.abs(dx), axis=0)
         if ds is not None:
-            size = np.maximum(size, np.max(np.abs(ds) / self._units()[:, None], axis=0))
+            size = np.maximum(
+                size, np.max(np.abs(ds) / actuator_units(self.machine)[:, None], axis=0)
+            )
         for limb, step in zip(closure.limbs, passive, strict=True):
             if step.size:
                 size = np.maximum(size, np.max(np.abs(step) / limb.group.unit, axis=(0, 1)))
         scale = np.where(size > MAX_STEP, MAX_STEP / size, 1.0)
         return np.where(np.isfinite(size), scale, 0.0), size
-
-    def _units(self) -> Array:
-        """A turn by one rad, or a way as long as the machine, in the unit of each actuator (n,)."""
-        return np.array(
-            [
-                (self.machine.size if axis.moves == "mm" else 1.0) / axis.ratio
-                for axis in self.machine.axes
-            ]
-        )
 
     def _apply(
         self,

@@ -16,9 +16,11 @@ from calib.mechanism.compiled import compile_machine
 from calib.mechanism.configuration import Configuration, joined
 from calib.mechanism.description import Machine
 from calib.mechanism.extrapolate import Extrapolation, probe_steps
+from calib.mechanism.kernel import Kernel, kernel_of
 from calib.mechanism.newton import MAX_STEP, Newton, run
 from calib.mechanism.rigid import Poses, from_euler
-from calib.mechanism.task import task_values
+from calib.mechanism.series import forward_numbers, inverse_numbers
+from calib.mechanism.task import FULL, task_values
 
 __all__ = [
     "CHUNK",
@@ -77,7 +79,7 @@ def home_configuration(machine: Machine) -> Configuration:
 def _extrapolation(machine: Machine) -> Extrapolation | None:
     """Series of the nominal machine about home; None where its neighbourhood does not close."""
     home = home_configuration(machine)
-    near = _solve(machine, home.extension + probe_steps(machine), None, None, home)
+    near = forward(machine, home.extension + probe_steps(machine), None, home)
     if not (np.all(home.converged) and np.all(near.converged)):
         return None
     return Extrapolation.fit(machine, _places(home), _places(near))
@@ -104,6 +106,32 @@ def _guess(machine: Machine, extension: Array) -> Configuration:
         np.zeros(count, dtype=np.intp),
         np.repeat(home.conditioning, count),
     )
+
+
+@lru_cache(maxsize=64)
+def _series(machine: Machine, inverse: bool) -> Array | None:
+    """Where the compiled core begins if nobody says where; None: at home."""
+    home, kernel = home_configuration(machine), kernel_of(machine)
+    if not inverse:
+        series = _extrapolation(machine)
+        return None if series is None else forward_numbers(home, series)
+    if kernel is None or not kernel.independent:
+        return None
+    return inverse_numbers(machine, kernel, home)
+
+
+def _start(machine: Machine, inverse: bool, start: Configuration | None) -> Configuration | Array:
+    if start is not None:
+        return start
+    series = _series(machine, inverse)
+    return home_configuration(machine) if series is None else series
+
+
+def _kernel(
+    machine: Machine, asked: Numbers, held: Numbers, start: Configuration | None
+) -> Kernel | None:
+    """The compiled core, where it knows the machine and all is real."""
+    return kernel_of(machine, asked, held, *([start.poses.position] if start else []))
 
 
 def _state_from(
@@ -169,8 +197,11 @@ def forward(
     BadInput
         If the limbs do not hold the platform.
     """
-    extension = np.asarray(extension)
-    return _solve(machine, extension, None, parameters, start)
+    extension, held = np.asarray(extension), _columns(parameters, machine)
+    kernel = _kernel(machine, extension, held, start)
+    if kernel is None:
+        return _solve(machine, extension, None, held, start)
+    return kernel.solve(held, extension, None, None, _start(machine, False, start))
 
 
 def inverse(
@@ -192,18 +223,28 @@ def inverse(
     parameters, start
         As for :func:`forward`.
     """
-    values = task_values(machine.task, target) if isinstance(target, Poses) else np.asarray(target)
-    return _solve(machine, None, values, parameters, start)
+    held, goal = _columns(parameters, machine), None
+    if not isinstance(target, Poses):
+        values = np.asarray(target)
+    elif machine.task.coordinates == FULL:
+        values, goal = target.position, target.rotation
+    else:
+        values = task_values(machine.task, target)
+    kernel = _kernel(machine, values, held, start)
+    if kernel is not None and kernel.inverts:
+        return kernel.solve(held, None, values, goal, _start(machine, True, start))
+    if isinstance(target, Poses):
+        values = task_values(machine.task, target)
+    return _solve(machine, None, values, held, start)
 
 
 def _solve(
     machine: Machine,
     extension: Numbers | None,
     target: Numbers | None,
-    parameters: Numbers | None,
+    held: Numbers,
     start: Configuration | None,
 ) -> Configuration:
-    held = _columns(parameters, machine)
     if start is None and extension is not None:
         start = _guess(machine, np.real(extension))
     start = start or home_configuration(machine)
