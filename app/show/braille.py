@@ -28,8 +28,12 @@ class Canvas:
         """Draw from a (2,) to b (2,), x to the right and y up."""
         ends = np.array([a, b]) * self.scale + self.origin
         steps = int(np.max(np.abs(ends[1] - ends[0]))) + 2
-        for share in np.linspace(0.0, 1.0, steps):
-            self.dot(ends[0] + share * (ends[1] - ends[0]))
+        share = np.linspace(0.0, 1.0, steps)[:, None]
+        columns, rows = np.rint(ends[0] + share * (ends[1] - ends[0])).astype(int).T
+        rows = len(self.dots) - 1 - rows
+        inside = (rows >= 0) & (rows < len(self.dots))
+        inside &= (columns >= 0) & (columns < self.dots.shape[1])
+        self.dots[rows[inside], columns[inside]] = True
 
     def mark(self, at: Array) -> None:
         """A small square around a point (2,)."""
@@ -46,15 +50,10 @@ class Canvas:
 
     def lines(self) -> list[str]:
         """The drawing, a text line for each row of characters."""
-        out = []
-        for top in range(0, len(self.dots), 4):
-            cells = []
-            for left in range(0, self.dots.shape[1], 2):
-                block = self.dots[top : top + 4, left : left + 2]
-                code = sum(_DOTS[i][j] for i in range(4) for j in range(2) if block[i, j])
-                cells.append(chr(0x2800 + code))
-            out.append("".join(cells))
-        return out
+        height, width = self.dots.shape
+        blocks = self.dots.reshape(height // 4, 4, width // 2, 2)
+        codes = 0x2800 + np.einsum("ridj,ij->rd", blocks, np.array(_DOTS))
+        return ["".join(map(chr, row)) for row in codes]
 
 
 def plain(text: str, encoding: str | None) -> str:

@@ -45,7 +45,6 @@ class ApplyFace(Face):
 
     def __init__(self) -> None:
         super().__init__()
-        self._drawn: tuple[object, ...] | None = None
         self._stages = 0
 
     def body(self) -> ComposeResult:

@@ -1,14 +1,16 @@
 """Choosing what to look at: runs for the study, from the sessions or by their folders."""
 
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from app.session.listing import facts_of
-from app.tui.dialogs import Enter, Pick
+from app.tui.dialogs import Choose, Enter, Pick
 from app.tui.face import Face
 from app.tui.shelf import runs_under
 from app.tui.starting import session_words
+
+OVERWRITE, ANOTHER = "overwrite", "another name"
 
 
 def choose_runs(face: Face, then: Callable[[], None]) -> None:
@@ -42,10 +44,43 @@ def choose_runs(face: Face, then: Callable[[], None]) -> None:
 
 def ask_for_model_file(face: Face) -> None:
     """Ask for a file and write the model there."""
+    text = "File for the effects and parameters found"
+    ask_for_file(
+        face, "Save model", text, "model.toml",
+        lambda path: face.act(lambda: face.desk.study.save(path)),
+    )  # fmt: skip
+
+
+def ask_for_file(
+    face: Face,
+    title: str,
+    text: str,
+    value: str,
+    then: Callable[[Path], None],
+    endings: Sequence[str] = (),
+) -> None:
+    """Ask where to write, and once more where that would overwrite something; then go on.
+
+    ``endings`` are those with which the file is written, where they are not its own.
+    """
 
     def entered(answer: str | None) -> None:
-        if answer:
-            face.act(lambda: face.desk.study.save(Path(answer)))
+        if not answer:
+            return
+        path = Path(answer).expanduser()
+        written = [path.with_suffix(ending) for ending in endings] or [path]
+        there = [str(one) for one in written if one.exists()]
+        if not there:
+            then(path)
+            return
 
-    text = "File for the effects and parameters found"
-    face.app.push_screen(Enter("Save model", text, "model.toml"), entered)
+        def sure(choice: str | None) -> None:
+            if choice == OVERWRITE:
+                then(path)
+            elif choice == ANOTHER:
+                ask_for_file(face, title, text, answer, then, endings)
+
+        said = f"{' and '.join(there)} {'is' if len(there) == 1 else 'are'} there already."
+        face.app.push_screen(Choose("Overwrite?", said, (OVERWRITE, ANOTHER), first=ANOTHER), sure)
+
+    face.app.push_screen(Enter(title, text, value), entered)

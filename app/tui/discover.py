@@ -67,7 +67,6 @@ class DiscoverFace(Face):
 
     def __init__(self) -> None:
         super().__init__()
-        self._drawn: tuple[object, ...] | None = None
         self._shown = 0
 
     def body(self) -> ComposeResult:

@@ -39,6 +39,7 @@ class Face(Screen[None]):
     def __init__(self) -> None:
         super().__init__()
         self._seen = -1
+        self._drawn: object = None
 
     @property
     def bench(self) -> "Workbench":
@@ -67,6 +68,12 @@ class Face(Screen[None]):
         """Begin drawing."""
         self.draw()
         self.set_interval(DRAW_S, self._tick)
+        self.app.theme_changed_signal.subscribe(self, lambda _: self._draw_anew())
+
+    def _draw_anew(self) -> None:
+        """Draw what else would be left as it is: its colours are others."""
+        self._drawn = None
+        self.draw()
 
     def on_screen_resume(self) -> None:
         """Draw what was missed while another screen was shown."""

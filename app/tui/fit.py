@@ -50,7 +50,6 @@ class FitFace(Face):
 
     def __init__(self) -> None:
         super().__init__()
-        self._drawn: tuple[FitAnswer | None, bool] | None = None
 
     def body(self) -> ComposeResult:
         """Summary to the left, parameters to the right."""
@@ -202,7 +201,7 @@ def parameter_row(entry: dict[str, Any], wide: bool) -> list[Text]:
     cells += [digits.text(sigma), ratio]
     style = "" if entry["identified"] else "dim"
     row = [Text(cell, style) for cell in cells]
-    return [*row, Text("" if entry["identified"] else "open", "#e8b45a")]
+    return [*row, Text("" if entry["identified"] else "open", "bold")]
 
 
 def _number(value: float | None, width: int, digits: int = 1) -> str:

@@ -47,7 +47,6 @@ class HistoryFace(Face):
 
     def __init__(self) -> None:
         super().__init__()
-        self._drawn: tuple[object, ...] | None = None
         self._series: list[SeriesEntry] = []
 
     def body(self) -> ComposeResult:

@@ -12,7 +12,7 @@ from textual.strip import Strip
 
 from app.tui.face import Face
 from app.tui.picture import LogLine, Picture
-from app.tui.theme import LEVELS
+from app.tui.theme import LEVELS, tinted
 
 
 class LogFace(Face):
@@ -106,5 +106,5 @@ class LogLines(ScrollView, can_focus=True):
         if index >= len(self._rows):
             return Strip.blank(self._width, base)
         line, text = self._rows[index]
-        style = base + Style.parse(LEVELS[line.level][1])
+        style = base + Style.parse(tinted(self.app, LEVELS[line.level][1]))
         return Strip([Segment(text.ljust(self._width)[: self._width], style)])

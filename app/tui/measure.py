@@ -15,6 +15,7 @@ from app.files.site import Site
 from app.session.listing import facts_of
 from app.tui.dialogs import Pick
 from app.tui.face import Face
+from app.tui.machine_view import MachineView
 from app.tui.picture import Picture
 from app.tui.planning import NewRun, RunWish, plan_for
 from app.tui.shelf import unfinished
@@ -50,7 +51,9 @@ class MeasureFace(Face):
             with Vertical(id="measure-right"):
                 yield Static(id="now", classes="panel")
                 yield MissPlot("Readings: distance from prediction, µm", id="miss")
-                yield ScatterPlot("Scatter while settling, µm, the last readings", id="scatter")
+                with Horizontal(id="measure-low"):
+                    yield ScatterPlot("Scatter while settling, µm", id="scatter")
+                    yield MachineView(id="machine")
 
     def on_mount(self) -> None:
         """Name the panel."""
@@ -66,6 +69,8 @@ class MeasureFace(Face):
         self.query_one("#now", Static).update(now_text(picture, self.wide, axes))
         base = self.desk.site.base_nests if self.desk.site else ()
         self.query_one(MissPlot).show(picture.points, base)
+        if self.wide and not self.low:
+            self.query_one(MachineView).show(self.desk.site, picture)
         scatter = picture.scatter
         if scatter:
             self.query_one(ScatterPlot).show(

@@ -25,6 +25,7 @@ from app.tui.history import HistoryFace
 from app.tui.log import LogFace
 from app.tui.measure import MeasureFace
 from app.tui.painting import Painted
+from app.tui.preferences import keep_theme, kept_theme
 from app.tui.residuals import ResidualsFace
 from app.tui.theme import BENCH
 from app.tui.verify import VerifyFace
@@ -90,7 +91,9 @@ class Workbench(Painted[None]):
         """Open the site that the command line named, and begin to watch."""
         self.start_painting()
         self.register_theme(BENCH)
-        self.theme = BENCH.name
+        kept = kept_theme()
+        self.theme = kept if kept in self.available_themes else BENCH.name
+        self.theme_changed_signal.subscribe(self, lambda theme: keep_theme(theme.name))
         self.set_interval(0.1, self._watch_prompt)
         self.run_worker(self._watch_devices(), group="poll", exit_on_error=True)
         self.run_worker(self._warm_up(), group="warm-up", exit_on_error=True)

@@ -46,7 +46,6 @@ class ResidualsFace(Face):
 
     def __init__(self) -> None:
         super().__init__()
-        self._drawn: tuple[object, ...] | None = None
         self._lines: Sequence[ReadingLine] = ()
         self._worst_first = True
         self._plane = 0

@@ -62,7 +62,10 @@ class Study:
         if not self.runs:
             latest = runs_under(self._root)
             if not latest:
-                raise BadInput("there is no run yet", remedy="Measure one, or choose a folder (o)")
+                remedy = "Measure one, or choose a folder (o)"
+                if self._picture.busy and self._picture.purpose == "measure":
+                    remedy = "Wait until the measurement that runs is finished"
+                raise BadInput("there is no run yet", remedy=remedy)
             self.choose((str(latest[0]),))
         return self.runs
 

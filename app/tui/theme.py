@@ -1,5 +1,6 @@
 """The screens' colours: calm, high contrast, and never the only carrier of a meaning."""
 
+from textual.app import App
 from textual.theme import Theme
 
 BENCH = Theme(
@@ -31,29 +32,48 @@ MARKS = {"planned": "·", "started": "▶", "done": "✓", "failed": "✗", "ski
 """A sign for each state of a step, so that no one has to tell colours apart."""
 
 STYLES = {
-    "planned": "#7d8d9a",
-    "started": "bold #e8b45a",
-    "done": "#86c06c",
-    "failed": "bold #f0706a",
-    "skipped": "#93a4b3",
+    "planned": "quiet",
+    "started": "bold accent",
+    "done": "success",
+    "failed": "bold error",
+    "skipped": "secondary",
 }
+"""Style of each state of a step, with a role in place of a colour (:func:`tinted`)."""
 
 LEVELS = {
-    "info": (" ", "#dbe2e8"),
-    "good": ("✓", "#86c06c"),
-    "warn": ("!", "#e8b45a"),
-    "bad": ("✗", "bold #f0706a"),
+    "info": (" ", "foreground"),
+    "good": ("✓", "success"),
+    "warn": ("!", "warning"),
+    "bad": ("✗", "bold error"),
 }
 
 SERIES = (
-    ("o", "#6cb6d9"),
-    ("x", "#e8b45a"),
-    ("+", "#86c06c"),
-    ("*", "#d78fd0"),
-    ("#", "#f0706a"),
-    ("%", "#93a4b3"),
+    ("o", "primary"),
+    ("x", "accent"),
+    ("+", "success"),
+    ("*", "plum"),
+    ("#", "error"),
+    ("%", "secondary"),
 )
-"""Marker and colour of each series in a plot."""
+"""Marker and role of each series in a plot."""
 
-BASE = ("·", "#93a4b3")
+BASE = ("·", "secondary")
 """The reference nests on the base."""
+
+FIXED = {"quiet": "#7d8d9a", "plum": "#d78fd0"}
+"""Roles that themes do not have; both are seen on dark and on light."""
+
+
+def tinted(app: App[object], style: str) -> str:
+    """A style with the present theme's colours in place of roles: ``bold error``."""
+    return " ".join(_colour(app.current_theme, word) for word in style.split())
+
+
+def _colour(theme: Theme, word: str) -> str:
+    if word == "foreground":
+        found = theme.foreground or ("#dbe2e8" if theme.dark else "#1b232a")
+    elif word in ("primary", "secondary", "accent", "success", "warning", "error"):
+        found = getattr(theme, word) or theme.primary
+    else:
+        found = FIXED.get(word, word)
+    return str(found).removeprefix("ansi_")

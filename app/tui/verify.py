@@ -12,7 +12,8 @@ from textual.widgets import DataTable, Static
 
 from app.session.listing import facts_of
 from app.show.spans import duration
-from app.tui.dialogs import Choose, Enter, Pick
+from app.tui.choosing import ask_for_file
+from app.tui.dialogs import Choose, Pick
 from app.tui.face import Face
 from app.tui.picture import Picture
 from app.tui.shelf import finished_verifications
@@ -24,6 +25,7 @@ from app.verification import PAPER
 from calib.arrays import Array
 from calib.pose_error import Summary
 
+RECORD_ENDINGS = (".html", ".pdf")
 ALL, QUICK = "all poses", "quick: one in eight"
 
 
@@ -54,7 +56,6 @@ class VerifyFace(Face):
 
     def __init__(self) -> None:
         super().__init__()
-        self._drawn: tuple[object, ...] = ()
         self._worst_first = False
 
     def body(self) -> ComposeResult:
@@ -156,14 +157,12 @@ class VerifyFace(Face):
             self.notify("Fit a run first (3 f): the record says what was found.")
             return
 
-        def entered(answer: str | None) -> None:
-            if answer:
-                out = Path(answer).expanduser()
-                outs = [out.with_suffix(".html"), out.with_suffix(".pdf")]
-                self.act(lambda: self.desk.write_record(outs), busy="writing the record ...")
+        def write(out: Path) -> None:
+            outs = [out.with_suffix(ending) for ending in RECORD_ENDINGS]
+            self.act(lambda: self.desk.write_record(outs), busy="writing the record ...")
 
         text = "File for the calibration record; it is written as .html and .pdf"
-        self.app.push_screen(Enter("Calibration record", text, "record"), entered)
+        ask_for_file(self, "Calibration record", text, "record", write, RECORD_ENDINGS)
 
     def action_worst(self) -> None:
         """Sort the other way."""

@@ -61,7 +61,8 @@ def draw(machine_name: str, closure: str, pose: str, out: Path | None) -> None:
     import numpy as np
 
     from app.show.braille import plain
-    from app.show.machine_drawing import draw_figure, draw_text
+    from app.show.machine_drawing import draw_figure
+    from app.show.machine_sketch import draw_text
     from calib.analysis.skeleton import skeleton
 
     machine = chosen_machine(machine_name, closure)

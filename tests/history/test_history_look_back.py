@@ -62,7 +62,7 @@ def test_a_session_is_listed_with_how_far_it_came(root: Path) -> None:
 
 
 def test_the_log_is_told_by_the_clock(root: Path) -> None:
-    found = session_log(None, root)
+    found = session_log(None, folder=root)
     assert [entry.kind for entry in found.entries] == [*["started", "done"] * 3, "answer"]
     assert found.entries[-1].utc == "2026-11-29T06:00:03.000+00:00"
 

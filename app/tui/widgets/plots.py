@@ -10,7 +10,7 @@ from textual_plot import HiResMode, PlotWidget
 from textual_plot.axis_formatter import NumericAxisFormatter
 
 from app.tui.picture import Point
-from app.tui.theme import BASE, SERIES
+from app.tui.theme import BASE, SERIES, tinted
 
 MOST = 400
 """More points than this cannot be told apart on a terminal."""
@@ -47,11 +47,15 @@ class QuietPlot(PlotWidget):
         self.set_y_formatter(Spaced(self))
 
     def changed(self, key: object) -> bool:
-        """Whether what is to be drawn differs from what is drawn."""
-        if key == self._drawn:
+        """Whether what is to be drawn, or the theme, differs from what is drawn."""
+        if (key, self.app.theme) == self._drawn:
             return False
-        self._drawn = key
+        self._drawn = (key, self.app.theme)
         return True
+
+    def tint(self, role: str) -> str:
+        """The present theme's colour for a role."""
+        return tinted(self.app, role)
 
 
 class MissPlot(QuietPlot):
@@ -79,7 +83,7 @@ class MissPlot(QuietPlot):
             x = np.array([float(point.number) for point in mine])
             y = np.array([point.miss_mm * 1000.0 for point in mine])
             x, y = thin(x, y, MOST // (len(nests) + 1))
-            self.scatter(x, y, marker=marker, marker_style=style)
+            self.scatter(x, y, marker=marker, marker_style=self.tint(style))
             if mine:
                 signs.append(f"{marker} {name}")
         self.border_subtitle = f"nest  {'   '.join(signs)}"
@@ -103,10 +107,10 @@ class ScatterPlot(QuietPlot):
         self.plot(
             np.array([0.0, max(20.0, x[-1])]),
             np.full(2, limit_mm * 1000.0),
-            line_style="#7d8d9a",
+            line_style=self.tint("quiet"),
             hires_mode=HiResMode.BRAILLE,
         )
-        self.plot(x, y, line_style="#6cb6d9", hires_mode=HiResMode.BRAILLE)
+        self.plot(x, y, line_style=self.tint("primary"), hires_mode=HiResMode.BRAILLE)
 
 
 class PairPlot(QuietPlot):
@@ -126,7 +130,7 @@ class PairPlot(QuietPlot):
         self.set_ylimits(0, max(1e-9, max(tops)) * 1.08)
         for (x, y), (marker, style) in zip(drawn.values(), SERIES, strict=False):
             thinned = thin(np.asarray(x, float), np.asarray(y, float), MOST)
-            self.scatter(*thinned, marker=marker, marker_style=style)
+            self.scatter(*thinned, marker=marker, marker_style=self.tint(style))
         self.border_subtitle = "   ".join(
             f"{marker} {name}" for name, (marker, _) in zip(drawn, SERIES, strict=False)
         )
@@ -149,7 +153,7 @@ class SeriesPlot(QuietPlot):
         room = 0.1 * (high - low) or 1.0
         self.set_ylimits(low - room, high + room)
         self.set_xlimits(*around(float(days[0]), float(days[-1])))
-        self.errorbar(days, y, yerr=sigma, marker="o", marker_style="#e8b45a")
+        self.errorbar(days, y, yerr=sigma, marker="o", marker_style=self.tint("accent"))
         against = " against the last" if middle else ""
         self.border_title = f"{name}, {unit}{against}, over days"
 
@@ -208,8 +212,10 @@ class BinPlot(QuietPlot):
         self.set_ylimits(-reach, reach)
         self.set_xlimits(*around(float(x[0]), float(x[-1])))
         self.set_xticks(few_ticks(float(x[0]), float(x[-1])))
-        self.plot(x[[0, -1]], np.zeros(2), line_style="#7d8d9a", hires_mode=HiResMode.BRAILLE)
-        self.errorbar(x, y, yerr=sigma, marker="o", marker_style="#e8b45a")
+        self.plot(
+            x[[0, -1]], np.zeros(2), line_style=self.tint("quiet"), hires_mode=HiResMode.BRAILLE
+        )
+        self.errorbar(x, y, yerr=sigma, marker="o", marker_style=self.tint("accent"))
         over = structure["channel"]
         if structure["period"]:
             over += f" mod {structure['period']:.3g}"

@@ -9,7 +9,7 @@ from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
 from app.tui.picture import StepLine
-from app.tui.theme import MARKS, STYLES
+from app.tui.theme import MARKS, STYLES, tinted
 
 
 class StepList(ScrollView, can_focus=True):
@@ -49,7 +49,7 @@ class StepList(ScrollView, can_focus=True):
         if index >= len(self._steps):
             return Strip.blank(width, base)
         step = self._steps[index]
-        style = base + Style.parse(STYLES[step.state])
+        style = base + Style.parse(tinted(self.app, STYLES[step.state]))
         if index == self._current:
             style += Style(reverse=True)
         number = f"{index + 1:>{len(str(len(self._steps)))}} "
