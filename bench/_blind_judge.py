@@ -86,8 +86,7 @@ def _likeness(stage: RunStage, signature: Vector, known: dict[str, int]) -> dict
     norm = max(float(signature @ left), 1e-300)
     found = {}
     for name, index in known.items():
-        overlap = scores.candidates[index].columns @ left
-        unit = overlap / np.maximum(scores.norms[index], 1e-300)
+        unit = scores.of_units(index, left[:, None])[:, :, 0]
         shares = np.einsum("tij,tj->ti", scores.weighings[index][0].whiten, unit)
         found[name] = float(np.sqrt(np.max(np.sum(shares**2, axis=1)) / norm))
     return found

@@ -20,6 +20,7 @@ from calib.discover.diagnosis import diagnose_fit
 from calib.discover.problem import effect_candidates, quadratics_of, variables_of
 from calib.effects import catalogue
 from calib.evidence import LinearProblem, diagnose, structure_candidates
+from calib.evidence.draws import residuals_of
 from calib.identify import Fit, fit
 from calib.identify.signatures import effect_columns
 from calib.model import Model
@@ -46,7 +47,7 @@ def false_alarms(found: Fit, count: int) -> float:
     rng = np.random.default_rng(2)
     alarms = 0
     for _ in range(count):
-        residual = problem.null_residuals(1, rng)[:, 0]
+        residual = residuals_of(problem, 1, rng).array()[:, 1]
         null = LinearProblem(residual, problem.jacobian, problem.prior_precision)
         alarms += not diagnose(null, effects, structure, quadratic, rng=rng).adequate
     return alarms / count

@@ -62,6 +62,11 @@ class Scaled:
         scaled = (columns.T * self.scale).T
         return np.asarray(np.linalg.solve(self.factor, scaled))
 
+    def half_solved_back(self, pulled: Array) -> Array:
+        """S L^-T pulled, (p,) or (p, m): after :meth:`half_solved`, N^-1 of what it was given."""
+        solved = np.linalg.solve(self.factor.T, pulled)
+        return np.asarray((solved.T * self.scale).T)
+
     @cached_property
     def factor(self) -> Array:
         """L (p, p), lower triangular."""

@@ -193,7 +193,7 @@ def _situation(
         rows=rows,
         passive_home=home_configuration(identified.machine).passive[:, 0],
         actuator_twists=jacobians.actuators,
-        parameter_twists=jacobians.parameters,
+        state_twists=jacobians.parameters,
         base_point=closed.poses.position,
         point=closed.poses.position,
         frame_rotation=np.repeat(np.eye(3)[:, :, None], rows.count, axis=2),

@@ -15,7 +15,7 @@ def pose_columns(identified: Identified, at: Standpoint) -> dict[str, Array]:
     columns = dict(
         zip(
             (parameter.name for parameter in identified.machine.parameters),
-            situation.parameter_twists,
+            situation.state_twists,
             strict=True,
         )
     )
@@ -26,9 +26,7 @@ def pose_columns(identified: Identified, at: Standpoint) -> dict[str, Array]:
             if signature.extension is not None:
                 twist += np.einsum("an,acn->cn", signature.extension[k], situation.actuator_twists)
             if signature.parameters is not None:
-                twist += np.einsum(
-                    "pn,pcn->cn", signature.parameters[k], situation.parameter_twists
-                )
+                twist += np.einsum("pn,pcn->cn", signature.parameters[k], situation.state_twists)
             if signature.twist is not None:
                 twist += signature.twist[k]
             columns[name] = twist

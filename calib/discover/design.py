@@ -26,6 +26,7 @@ from calib.discover.problem import effect_candidates
 from calib.effects.component import Effect
 from calib.errors import BadInput
 from calib.evidence.candidate import Candidate
+from calib.evidence.columns import Columns
 from calib.evidence.diagnosis import diagnose
 from calib.evidence.family import family
 from calib.evidence.findings import Finding
@@ -242,12 +243,14 @@ def _candidate(side: Side, now: Array, then: Array | None = None) -> Candidate:
     """One effect at its trial over old readings, and new ones; a drift has its own in each."""
     whole = side.candidate
     if then is None:
-        return Candidate(whole.name, whole.unknowns, now[None], subsets=whole.subsets)
+        return Candidate(whole.name, whole.unknowns, Columns.of(now[None]), subsets=whole.subsets)
     if not side.own:
         columns = np.concatenate([now, then], axis=1)
-        return Candidate(whole.name, whole.unknowns, columns[None], subsets=whole.subsets)
+        return Candidate(
+            whole.name, whole.unknowns, Columns.of(columns[None]), subsets=whole.subsets
+        )
     columns = np.block([[now, np.zeros((now.shape[0], then.shape[1]))], [np.zeros_like(now), then]])
-    return Candidate(whole.name, whole.unknowns * 2, columns[None])
+    return Candidate(whole.name, whole.unknowns * 2, Columns.of(columns[None]))
 
 
 def _hidden(side: Side, candidate: Candidate) -> Array:

@@ -107,7 +107,7 @@ def _freed(fitted: Fit, one: Candidate) -> Candidate:
         return whitening.apply(columns.reshape(*shape[:-1], 3, -1)).reshape(shape)
 
     at = None if between is None else lambda period: freed(between(period))
-    return replace(one, columns=freed(one.columns), between=at)
+    return replace(one, columns=one.columns.changed(freed), between=at)
 
 
 def diagnose_fit(

@@ -3,13 +3,14 @@
 Components are ordered as (3, A) flattened: axis after axis over the accepted readings.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from calib.arrays import Array
+from calib.arrays import Array, BoolArray
 from calib.effects.tracker import rigid_motions
 from calib.evidence.candidate import Candidate, fill_missing, unit_errors
+from calib.evidence.columns import Columns
 from calib.evidence.problem import LinearProblem
 from calib.evidence.quadratic import Neighbours, Quadratic, rigid_blocks
 from calib.evidence.structure import Response, Variable
@@ -31,17 +32,26 @@ def effect_candidates(
 
 
 def _candidate(fit: Fit, problem: LinearProblem, one: EffectColumns) -> Candidate:
-    columns = fit.whiten(one.columns)
     missing = np.tile(~one.known[fit.accepted], 3)
-    if missing.any():
-        errors = unit_errors(missing)
-        if fit.whitening is not None:
-            freed = fit.whitening.apply(errors.reshape(errors.shape[0], 3, -1))
-            errors = freed.reshape(errors.shape)
-        columns = fill_missing(problem, columns, missing, errors)
+    replaced = _replacing(fit, problem, missing) if missing.any() else None
     linear = tuple(unknown for unknown in one.unknowns if not unknown.nonlinear)
+
+    def make(first: int, last: int) -> Array:
+        made = np.stack([fit.whiten(one.at(trial)) for trial in range(first, last)])
+        return made if replaced is None else replaced(made)
+
+    columns = Columns((len(one.trials), len(linear), 3 * fit.readings), make)
     subsets = one.effect.parts(fit.model.rows)
     return Candidate(one.effect.id, linear, columns, one.trials, subsets=subsets)
+
+
+def _replacing(fit: Fit, problem: LinearProblem, missing: BoolArray) -> Callable[[Array], Array]:
+    """What makes columns of some readings' components count no more, ``missing`` (3 A,)."""
+    errors = unit_errors(missing)
+    if fit.whitening is not None:
+        freed = fit.whitening.apply(errors.reshape(errors.shape[0], 3, -1))
+        errors = freed.reshape(errors.shape)
+    return lambda made: fill_missing(problem, made, missing, errors)
 
 
 def every_leg(fit: Fit) -> Response:

@@ -42,8 +42,8 @@ class Situation:
         Passive coordinates at home.
     actuator_twists : (n, 6, N)
         Derivative of the platform's twist by each extension, base axes.
-    parameter_twists : (P, 6, N)
-        The same by each parameter.
+    state_twists : (P, 6, M)
+        The same by each parameter, at each of the distinct states of ``state_of``.
     base_point, point : (3, N)
         SMR centre in the base frame and in the tracker frame, mm.
     frame_rotation : (3, 3, N)
@@ -60,7 +60,7 @@ class Situation:
     rows: Rows
     passive_home: Array
     actuator_twists: Array
-    parameter_twists: Array
+    state_twists: Array
     base_point: Array
     point: Array
     frame_rotation: Array
@@ -82,6 +82,10 @@ class Situation:
     def machine(self) -> Machine:
         """The machine."""
         return self.rows.machine
+
+    def twists_of(self, parameters: IntArray) -> Array:
+        """Derivative (k, 6, N) of the platform's twist by some parameters, base axes."""
+        return np.asarray(self.state_twists[parameters][:, :, self.state_of])
 
     @cached_property
     def position(self) -> Array:

@@ -7,6 +7,7 @@ whitened columns, one block for each trial of a nonlinear unknown), and answers 
 """
 
 from calib.evidence.candidate import Candidate, fill_missing
+from calib.evidence.columns import Columns
 from calib.evidence.diagnosis import diagnose
 from calib.evidence.findings import Diagnosis, Finding, Unexplained
 from calib.evidence.forward import Discovery, Revision, Stage, discover
@@ -17,6 +18,7 @@ from calib.evidence.structure import Response, Variable, structure_candidates
 
 __all__ = [
     "Candidate",
+    "Columns",
     "Diagnosis",
     "Discovery",
     "Finding",

@@ -16,13 +16,13 @@ Where even the best explanation leaves more than the stated noise, sigmas are ta
 import numpy as np
 
 from calib.arrays import Array
-from calib.evidence.scores import Scores
+from calib.evidence.scored import Scored
 
 TAUS = np.geomspace(1.0 / 30.0, 3.0, 7)
 """Multiples of the stated size over which the prior of an effect is averaged."""
 
 
-def observed(scores: Scores, index: int) -> tuple[float, list[Array]]:
+def observed(scores: Scored, index: int) -> tuple[float, list[Array]]:
     """Log Bayes factor of a candidate in the observation, and its parts (T, 1)."""
     if index not in scores.remembered:
         found = scores.scores[index][:, :, :1] / scores.noise
@@ -31,7 +31,7 @@ def observed(scores: Scores, index: int) -> tuple[float, list[Array]]:
     return scores.remembered[index]
 
 
-def log_evidence(scores: Scores, index: int, residual_scores: Array) -> tuple[Array, list[Array]]:
+def log_evidence(scores: Scored, index: int, residual_scores: Array) -> tuple[Array, list[Array]]:
     """Log Bayes factor of a candidate against nothing missing.
 
     Parameters
@@ -61,7 +61,7 @@ def log_evidence(scores: Scores, index: int, residual_scores: Array) -> tuple[Ar
     return np.asarray(total), parts
 
 
-def _by_trial(scores: Scores, index: int, subset: tuple[int, ...], residual_scores: Array) -> Array:
+def _by_trial(scores: Scored, index: int, subset: tuple[int, ...], residual_scores: Array) -> Array:
     """Log Bayes factor (T, D) of one hypothesis, averaged over tau."""
     chosen = np.array(subset, dtype=np.intp)
     size = scores.norms[index][:, chosen] * scores.candidates[index].sizes[chosen] / scores.noise

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from calib.arrays import Array, BoolArray, IntArray
+from calib.evidence.columns import Columns
 from calib.evidence.problem import LinearProblem
 from calib.unknown import Unknown
 
@@ -20,7 +21,7 @@ class Candidate:
     name : str
     unknowns : tuple of k Unknown
         The linear ones.
-    columns : (T, k, R)
+    columns : Columns, (T, k, R)
         Whitened derivatives of the prediction by each unknown, for each of T trials of the
         nonlinear unknowns (T = 1 if there are none).
     trials : tuple of T tuples
@@ -36,23 +37,18 @@ class Candidate:
 
     name: str
     unknowns: tuple[Unknown, ...]
-    columns: Array
+    columns: Columns
     trials: tuple[tuple[float, ...], ...] = ((),)
     subsets: tuple[tuple[int, ...], ...] = field(default=())
     channel: str = ""
     between: Callable[[float], Array] | None = None
 
     def __post_init__(self) -> None:
-        if self.columns.ndim != 3 or self.columns.shape[:2] != (
-            len(self.trials),
-            len(self.unknowns),
-        ):
+        if self.columns.shape[:2] != (len(self.trials), len(self.unknowns)):
             raise ValueError(
                 f"{self.name}: columns have shape {self.columns.shape}, expected"
                 f" ({len(self.trials)}, {len(self.unknowns)}, rows)"
             )
-        if not np.isfinite(self.columns).all():
-            raise ValueError(f"{self.name}: columns are not finite; see fill_missing")
 
     @cached_property
     def sizes(self) -> Array:

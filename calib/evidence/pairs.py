@@ -40,8 +40,8 @@ def power(
     draws = family.highest.size
     projected = scores.problem.project(signature)
     shifted = shifted_scores(scores, index, signature, draws)
-    residuals = scores.residuals[:, 1:]
-    squares = scores.squares[1:] + 2.0 * (projected @ residuals) + projected @ projected
+    along = scores.residuals.times(projected[None])[0, 1:]
+    squares = scores.squares[1:] + 2.0 * along + projected @ projected
     level = scores.level(index, shifted, squares)
     null = scores.levels[index][1:]
     weight = family.strengths[index, 1:] + log_any(-null, looks(null))

@@ -79,7 +79,7 @@ class LinearProblem:
     @cached_property
     def trace(self) -> float:
         """tr M = R - tr H, the degrees of freedom left."""
-        return float(self.rows - np.sum(self.absorbed**2))
+        return float(self.rows - np.einsum("pr,pr->", self.absorbed, self.absorbed))
 
     @cached_property
     def _column_space(self) -> Array:
@@ -106,21 +106,6 @@ class LinearProblem:
             return 0.0
         within = columns @ self._column_space.T
         return float(np.sqrt(max(before - float(np.sum(within**2)), 0.0) / before))
-
-    def null_residuals(self, draws: int, rng: np.random.Generator) -> Array:
-        """Residuals (R, draws) of fits in which nothing is missing, e ~ N(0, M).
-
-        By perturbation: e = eps - J^T N^-1 (J eps + Lambda^1/2 xi), whose covariance is
-        I - 2 J^T N^-1 J + J^T N^-1 N N^-1 J = M.
-        """
-        noise = rng.standard_normal((self.residual.size, draws))
-        if self.live is not None:
-            noise *= self.live[:, None]
-        prior = np.sqrt(self.prior_precision)[:, None] * rng.standard_normal(
-            (self.prior_precision.size, draws)
-        )
-        pulled = self.absorbed @ noise + self._normal.half_solved(prior)
-        return np.asarray(noise - self.absorbed.T @ pulled)
 
     def with_columns(self, columns: Array, precision: Array) -> "LinearProblem":
         """Let the fit take ``columns`` (k, R) too, with prior ``precision`` (k,); relinearised.

@@ -10,6 +10,7 @@ import numpy as np
 
 from calib.arrays import Array, IntArray
 from calib.chance import log_normal_below
+from calib.evidence.draws import Residuals, squared
 from calib.evidence.tails import log_tail
 
 
@@ -21,12 +22,15 @@ class Neighbours:
     after: IntArray
     channel: str = "time_s"
 
-    def level(self, residuals: Array) -> Array:
-        """-log p (1 + draws,) from residuals (R, 1 + draws), observation first."""
-        product = np.einsum("pd,pd->d", residuals[self.before], residuals[self.after])
-        ratio = product / np.einsum("rd,rd->d", residuals, residuals)
+    def level(self, residuals: Residuals) -> Array:
+        """-log p (1 + draws,), observation first."""
+        ratio = residuals.by_draw(self._ratio)
         null = ratio[1:]
         return -log_normal_below((null.mean() - ratio) / null.std())
+
+    def _ratio(self, residuals: Array) -> Array:
+        product = np.einsum("pd,pd->d", residuals[self.before], residuals[self.after])
+        return np.asarray(product / squared(residuals))
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,14 +46,16 @@ class RigidBlocks:
     bases: Array
     channel: str = "pose"
 
-    def level(self, residuals: Array) -> Array:
-        """-log p (1 + draws,) from residuals (R, 1 + draws), observation first."""
-        within = self.bases @ residuals[self.members]
-        ratio = np.einsum("bkd,bkd->d", within, within)
-        ratio /= np.einsum("rd,rd->d", residuals, residuals)
+    def level(self, residuals: Residuals) -> Array:
+        """-log p (1 + draws,), observation first."""
+        ratio = residuals.by_draw(self._ratio)
         null = ratio[1:]
         dof = max(1, int(2.0 * null.mean() ** 2 / null.var()))
         return -log_tail(ratio * dof / null.mean(), dof)
+
+    def _ratio(self, residuals: Array) -> Array:
+        within = self.bases @ residuals[self.members]
+        return np.asarray(np.einsum("bkd,bkd->d", within, within) / squared(residuals))
 
 
 Quadratic = Neighbours | RigidBlocks

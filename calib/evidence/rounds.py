@@ -10,6 +10,7 @@ from calib.arrays import Array
 from calib.evidence.bayes import observed
 from calib.evidence.family import Family, family, significant
 from calib.evidence.quadratic import Quadratic
+from calib.evidence.scored import Scored
 from calib.evidence.scores import Scores
 
 STRUCTURE_SHARE = 0.05
@@ -111,7 +112,7 @@ def _judge(scores: Scores, effects: int, quadratic: Sequence[Quadratic]) -> Roun
     return Round(scores, family(levels, weights), tuple(range(effects)))
 
 
-def best_hypothesis(scores: Scores, index: int) -> tuple[int, int]:
+def best_hypothesis(scores: Scored, index: int) -> tuple[int, int]:
     """Number of the hypothesis and of the trial with the most evidence."""
     _, parts = observed(scores, index)
     number = int(np.argmax([part[:, 0].max() for part in parts]))
@@ -124,7 +125,7 @@ def signature_of(scores: Scores, index: int) -> tuple[Array, int, int]:
     candidate = scores.candidates[index]
     subset = candidate.hypotheses[number]
     beta, _ = scores.estimate(index, trial, subset)
-    return beta @ candidate.columns[trial, list(subset)], number, trial
+    return beta @ candidate.columns[trial][list(subset)], number, trial
 
 
 def at_least(scores: Scores, index: int) -> Array:
@@ -140,7 +141,7 @@ def at_least(scores: Scores, index: int) -> Array:
     return np.asarray(signature * (max(beyond, 0.0) / np.sqrt(max(fall, 1e-300))))
 
 
-def joining(scores: Scores, index: int) -> tuple[Array, Array]:
+def joining(scores: Scored, index: int) -> tuple[Array, Array]:
     """Columns and prior precision with which a candidate joins the linearised fit.
 
     The whole group at its best trial and, along a scanned unknown, first and second differences

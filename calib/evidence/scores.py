@@ -1,171 +1,43 @@
 """Every hypothesis in the observed residual and in fits where nothing is missing.
 
-For a hypothesis with columns A (k, R) the score s = A e has covariance V = A M A^T under the null;
-whitened, a = V^-1/2 s, the statistic |a|^2 is chi-square with k degrees of freedom: it is the fall
-of chi-square if the hypothesis were added to the fit.
-
-**Noise.** Readings have stated sigmas. They are trusted unless the data prove them too small: a
-hypothesis is judged against s^2 = max(1, (|e|^2 - |a|^2) / (tr M - k)), what is left *after* it.
-A right effect leaves 1, so this costs it nothing; readings that all scatter more than they claim
-do not pass for an effect. The null draws go through the same arithmetic, which keeps the false
-alarm exact.
+Columns and null draws are taken in blocks (:mod:`calib.evidence.columns`,
+:mod:`calib.evidence.draws`): what is held grows with the readings and with the number of trials,
+not with their product. What scores say is :mod:`calib.evidence.scored`.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib.arrays import Array
 from calib.evidence.candidate import Candidate
+from calib.evidence.columns import Room
+from calib.evidence.draws import Residuals, residuals_of, squared
 from calib.evidence.problem import LinearProblem
-from calib.evidence.tails import log_any, log_tail, looks
-from calib.evidence.weighing import Stack, Weighing, chi_squares, soft_test, stacked
+from calib.evidence.scored import Scored
 from calib.scaled import Scaled
 
-EVEN = 0.9
-"""A group that is seen so evenly needs no test in which its directions weigh differently."""
 
-
-@dataclass(eq=False)
-class Scores:
-    """Scores of all candidates in the observation (draw 0) and in null draws 1...
+@dataclass(eq=False, kw_only=True)
+class Scores(Scored):
+    """Scores with the fit that they are of.
 
     Attributes
     ----------
     problem : LinearProblem
-    candidates : sequence of Candidate
-    residuals : (R, 1 + draws)
-        Observed residual first.
-    norms : list of (T, k)
-        Norm of each column before projection.
-    scores : list of (T, k, 1 + draws)
-        Unit columns times residuals.
-    weights : list of (T, k, k)
-        Unit columns times M times unit columns.
+    residuals : Residuals
+        Observed residual first, then null draws.
     """
 
     problem: LinearProblem
-    candidates: Sequence[Candidate]
-    residuals: Array
-    norms: list[Array]
-    scores: list[Array]
-    weights: list[Array]
-    remembered: dict[int, tuple[float, list[Array]]] = field(default_factory=dict, repr=False)
-    """Evidence of the observation by candidate, kept by :mod:`calib.evidence.bayes`."""
-
-    @cached_property
-    def squares(self) -> Array:
-        """|e|^2 of every draw."""
-        return np.asarray(np.einsum("rd,rd->d", self.residuals, self.residuals))
-
-    @cached_property
-    def _stacks(self) -> list[list[Stack]]:
-        """For every candidate its hypotheses, those of equally many unknowns together."""
-        return [
-            [stacked(weight, chosen) for chosen in candidate.by_count]
-            for candidate, weight in zip(self.candidates, self.weights, strict=True)
-        ]
-
-    @cached_property
-    def _softs(self) -> list[Stack | None]:
-        """For every candidate its soft test; None where the whole group is seen evenly."""
-        found: list[Stack | None] = []
-        for candidate, weight, norm, stacks in zip(
-            self.candidates, self.weights, self.norms, self._stacks, strict=True
-        ):
-            soft = (
-                soft_test(weight, norm * candidate.sizes) if len(candidate.unknowns) > 1 else None
-            )
-            even = soft is None or not np.any(soft.dof < EVEN * stacks[0].dof)
-            found.append(None if even else soft)
-        return found
-
-    @cached_property
-    def weighings(self) -> list[list[Weighing]]:
-        """For every candidate the whitening of each of its hypotheses."""
-        found = []
-        for candidate, stacks in zip(self.candidates, self._stacks, strict=True):
-            place = {one.subset: one for stack in stacks for one in stack.weighings()}
-            found.append([place[subset] for subset in candidate.hypotheses])
-        return found
-
-    @cached_property
-    def _both(self) -> list[tuple[Array, Array | None]]:
-        """For every candidate -log p (1 + draws,) by its best hypothesis, and by its soft test."""
-        return [self._apart(index, found, self.squares) for index, found in enumerate(self.scores)]
-
-    @cached_property
-    def _looks(self) -> list[tuple[float, float]]:
-        """For every candidate how many independent looks the two tests take."""
-        return [
-            (looks(best[1:]), 1.0 if soft is None else looks(soft[1:])) for best, soft in self._both
-        ]
-
-    @cached_property
-    def levels(self) -> list[Array]:
-        """For every candidate its -log p, (1 + draws,), the observation first."""
-        return [self._joined(index, *both) for index, both in enumerate(self._both)]
-
-    def level(self, index: int, scores: Array, squares: Array) -> Array:
-        """-log p of a candidate for given scores (T, k, D) and |e|^2 (D,).
-
-        By its best hypothesis and trial, or by the soft test of the whole group where that is
-        smaller: a maximum over parts is weak where many unknowns act, the soft test where one does.
-        Each pays for its own looks.
-        """
-        return self._joined(index, *self._apart(index, scores, squares))
-
-    def _joined(self, index: int, best: Array, soft: Array | None) -> Array:
-        if soft is None:
-            return best
-        own, other = self._looks[index]
-        return np.maximum(-log_any(-best, own), -log_any(-soft, other))
-
-    def _apart(self, index: int, scores: Array, squares: Array) -> tuple[Array, Array | None]:
-        best = np.zeros(scores.shape[-1])
-        for stack in self._stacks[index]:
-            best = np.maximum(best, self._largest(stack, scores, squares))
-        soft = self._softs[index]
-        return best, None if soft is None else self._largest(soft, scores, squares)
-
-    def _largest(self, stack: Stack, scores: Array, squares: Array) -> Array:
-        """Largest -log p (D,) over the hypotheses of a stack and their trials."""
-        best = np.zeros(scores.shape[-1])
-        chi2, freedom = stack.chi_squares(scores), stack.dof.reshape(-1)
-        for dof in np.unique(freedom):
-            if dof == 0:
-                continue
-            here = chi2 if freedom.size == 1 else chi2[freedom == dof]
-            left = (squares - here) / max(self.problem.trace - dof, 1.0)
-            judged = (here / np.maximum(left, 1.0)).max(axis=0)
-            best = np.maximum(best, -log_tail(judged, float(dof)))
-        return best
-
-    @cached_property
-    def noise(self) -> float:
-        """Standard deviation of a reading, in sigmas: 1, or what the best explanation leaves.
-
-        With more missing than one effect, what one leaves is noise to the comparison of two.
-        """
-        left = [float(self.squares[0]) / max(self.problem.trace, 1.0)]
-        for scores, stacks in zip(self.scores, self._stacks, strict=True):
-            for stack in stacks:
-                chi2 = stack.chi_squares(scores[:, :, :1])[:, 0]
-                dof = np.maximum(self.problem.trace - stack.dof.reshape(-1), 1.0)
-                left.append(float(np.min((self.squares[0] - chi2) / dof)))
-        return float(np.sqrt(max(1.0, min(left))))
-
-    def fall(self, index: int, number: int, trial: int) -> tuple[float, int]:
-        """Fall of chi-square by a hypothesis in the observation, and its degrees of freedom."""
-        weighing = self.weighings[index][number]
-        seen = chi_squares(weighing, self.scores[index][:, :, :1])[trial, 0]
-        return float(seen), int(weighing.dof[trial])
+    residuals: Residuals
 
     def of_units(self, index: int, matrix: Array) -> Array:
         """Unit columns of a candidate times a matrix (R, m): (T, k, m)."""
-        return _times(self.candidates[index].columns, matrix, self.norms[index])
+        norm, columns = self.norms[index], self.candidates[index].columns
+        parts = [_times(block, matrix, norm[part]) for part, block in columns.blocks()]
+        return np.concatenate(parts)
 
     def without(self, columns: Array, precision: Array, rng: np.random.Generator) -> "Scores":
         """Scores after ``columns`` (k, R) with prior ``precision`` (k,) have joined the fit.
@@ -178,70 +50,108 @@ class Scores:
         scaled = Scaled.of(weight)
         taken = scaled.half_solved(projected)
         prior = np.sqrt(precision)[:, None] * rng.standard_normal(
-            (precision.size, self.residuals.shape[1])
+            (precision.size, self.residuals.count)
         )
         prior[:, 0] = 0.0
-        pulled = scaled.half_solved(columns @ self.residuals + prior)
+        pulled = scaled.half_solved(self.residuals.times(columns) + prior)
         scores, weights = [], []
         for index, old in enumerate(self.scores):
             cross = self.of_units(index, taken.T)
             scores.append(old - cross @ pulled)
             weights.append(self.weights[index] - cross @ np.swapaxes(cross, 1, 2))
-        return Scores(
-            problem=self.problem.with_columns(columns, precision),
-            candidates=self.candidates,
-            residuals=self.residuals - taken.T @ pulled,
-            norms=self.norms,
-            scores=scores,
-            weights=weights,
+        return _joined(
+            self.problem.with_columns(columns, precision),
+            self.residuals.without(taken, pulled),
+            self.candidates,
+            (self.norms, scores, weights),
         )
 
     def with_more(self, draws: int, rng: np.random.Generator) -> "Scores":
         """The same with so many null draws more."""
-        residuals = self.problem.null_residuals(draws, rng)
+        more = residuals_of(self.problem, draws, rng)
+        scores = _scores(self.candidates, more, self.norms)
         scores = [
-            np.concatenate([old, self.of_units(index, residuals)], axis=2)
-            for index, old in enumerate(self.scores)
+            np.concatenate([old, new[:, :, 1:]], axis=2)
+            for old, new in zip(self.scores, scores, strict=True)
         ]
-        whole = np.concatenate([self.residuals, residuals], axis=1)
-        return replace(self, residuals=whole, scores=scores)
-
-    def estimate(self, index: int, trial: int, subset: tuple[int, ...]) -> tuple[Array, Array]:
-        """Values (k,) and covariance (k, k) of a hypothesis's unknowns, with their own priors."""
-        chosen = list(subset)
-        norm = self.norms[index][trial, chosen]
-        norm = np.where(norm > 0.0, norm, 1.0)
-        candidate = self.candidates[index]
-        weight = self.weights[index][trial][np.ix_(chosen, chosen)].copy()
-        weight += np.diag(candidate.prior_precision[chosen] / norm**2)
-        covariance = np.linalg.inv(weight)
-        beta = covariance @ self.scores[index][trial, chosen, 0]
-        return beta / norm, covariance / (norm[:, None] * norm)
+        return _joined(
+            self.problem,
+            self.residuals.joined(more),
+            self.candidates,
+            (self.norms, scores, self.weights),
+        )
 
 
 def score(
     problem: LinearProblem, candidates: Sequence[Candidate], rng: np.random.Generator, draws: int
 ) -> Scores:
     """Score candidates in the observed residual and in ``draws`` fits with nothing missing."""
-    residuals = np.concatenate(
-        [problem.residual[:, None], problem.null_residuals(draws, rng)], axis=1
+    room = Room()
+    candidates = [replace(one, columns=room.held(one.columns)) for one in candidates]
+    residuals = residuals_of(problem, draws, rng)
+    norms = [np.empty(one.columns.shape[:2]) for one in candidates]
+    weights = [np.empty((*one.columns.shape[:2], one.columns.shape[1])) for one in candidates]
+
+    def weigh(index: int, part: slice, block: Array) -> None:
+        norms[index][part], weights[index][part] = _weighed(problem, block)
+
+    scores = _scores(candidates, residuals, norms, weigh)
+    return _joined(problem, residuals, candidates, (norms, scores, weights))
+
+
+def _joined(
+    problem: LinearProblem,
+    residuals: Residuals,
+    candidates: Sequence[Candidate],
+    numbers: tuple[list[Array], list[Array], list[Array]],
+) -> Scores:
+    """Scores from norms, scores and weights of all candidates."""
+    norms, scores, weights = numbers
+    return Scores(
+        problem=problem,
+        residuals=residuals,
+        candidates=candidates,
+        norms=norms,
+        scores=scores,
+        weights=weights,
+        squares=residuals.by_draw(squared),
+        trace=problem.trace,
     )
-    norms, scores, weights = [], [], []
-    for candidate in candidates:
-        columns = candidate.columns
-        products = columns @ np.swapaxes(columns, 1, 2)
-        norm = np.sqrt(np.diagonal(products, axis1=1, axis2=2))
-        absorbed = _times(columns, problem.absorbed.T, norm)
-        safe = np.where(norm > 0.0, norm, 1.0)
-        weight = products / safe[:, :, None] / safe[:, None, :]
-        norms.append(norm)
-        scores.append(_times(columns, residuals, norm))
-        weights.append(weight - absorbed @ np.swapaxes(absorbed, 1, 2))
-    return Scores(problem, list(candidates), residuals, norms, scores, weights)
 
 
-def _times(columns: Array, matrix: Array, norm: Array) -> Array:
-    """Columns (T, k, R) divided by their norms (T, k), times a matrix (R, m)."""
-    product = columns.reshape(-1, columns.shape[2]) @ matrix
+def _weighed(problem: LinearProblem, block: Array) -> tuple[Array, Array]:
+    """Norms (t, k) of a block of columns (t, k, R), and unit columns times M times themselves."""
+    products = block @ np.swapaxes(block, 1, 2)
+    norm = np.sqrt(np.diagonal(products, axis1=1, axis2=2))
+    absorbed = _times(block, problem.absorbed.T, norm)
+    safe = np.where(norm > 0.0, norm, 1.0)
+    weight = products / safe[:, :, None] / safe[:, None, :]
+    return norm, weight - absorbed @ np.swapaxes(absorbed, 1, 2)
+
+
+def _scores(
+    candidates: Sequence[Candidate],
+    residuals: Residuals,
+    norms: Sequence[Array],
+    before: Callable[[int, slice, Array], None] | None = None,
+) -> list[Array]:
+    """Unit columns of all candidates times all residuals, (T, k, 1 + draws) each.
+
+    Blocks of draws outside, blocks of columns inside: what does not fit into the memory is made
+    again for each block of draws. ``before`` sees every block of columns once, first.
+    """
+    found = [np.empty((*one.columns.shape[:2], residuals.count)) for one in candidates]
+    for which, drawn in residuals.blocks():
+        for index, candidate in enumerate(candidates):
+            for part, block in candidate.columns.blocks():
+                if before is not None and which.start == 0:
+                    before(index, part, block)
+                found[index][part, :, which] = _times(block, drawn, norms[index][part])
+    return found
+
+
+def _times(block: Array, matrix: Array, norm: Array) -> Array:
+    """Columns (t, k, R) divided by their norms (t, k), times a matrix (R, m)."""
+    product = block.reshape(-1, block.shape[2]) @ matrix
     product /= np.where(norm > 0.0, norm, 1.0).reshape(-1, 1)
     return np.asarray(product.reshape(*norm.shape, -1))

@@ -7,7 +7,7 @@ candidate is every response times a few smooth functions of one variable. It is 
 effect, and says what the rest depends on, not why.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,6 +16,7 @@ from numpy.polynomial import legendre
 
 from calib.arrays import Array
 from calib.evidence.candidate import Candidate
+from calib.evidence.columns import Columns
 from calib.unknown import Unknown
 
 ORDER = 4
@@ -23,7 +24,7 @@ ORDER = 4
 MOST_PERIODS = 48
 """Periods that are tried at most for one variable, unless it says otherwise."""
 MOST_NUMBERS = 10_000_000
-"""Numbers in the columns of one variable beyond which fewer periods are tried."""
+"""Numbers in the columns of one variable beyond which fewer periods are tried (time)."""
 
 Kind = Literal["smooth", "linear", "levels", "periodic"]
 
@@ -100,9 +101,9 @@ def _smooth(variable: Variable, response: Response, most: int) -> Candidate:
     distinct = min(np.unique(row).size for row in values)
     order = max(1, min(most, distinct - 1))
     low, high = variable.values.min(), variable.values.max()
-    shapes = _legendre(2.0 * (values - low) / (high - low) - 1.0, order)
-    columns = (shapes * response.columns).reshape(1, -1, response.columns.shape[1])
+    scaled = 2.0 * (values - low) / (high - low) - 1.0
     count = response.columns.shape[0]
+    columns = _of_shapes(count * order, response, lambda: _legendre(scaled, order))
     subsets = [tuple(range(count * top)) for top in range(1, order)]
     if count > 1:
         subsets += [tuple(range(axis, count * order, count)) for axis in range(count)]
@@ -115,6 +116,16 @@ def _smooth(variable: Variable, response: Response, most: int) -> Candidate:
     return Candidate(name, unknowns, columns, subsets=tuple(subsets), channel=variable.name)
 
 
+def _of_shapes(count: int, response: Response, shapes: Callable[[], Array]) -> Columns:
+    """Columns (1, count, R): every direction of a response times each of some shapes."""
+    rows = response.columns.shape[1]
+
+    def make(first: int, last: int) -> Array:
+        return np.asarray((shapes() * response.columns).reshape(1, -1, rows)[first:last])
+
+    return Columns((1, count, rows), make)
+
+
 def _legendre(scaled: Array, order: int) -> Array:
     """P_1..P_order of values in [-1, 1]: (order, *shape)."""
     return np.asarray(np.moveaxis(legendre.legvander(scaled, order), -1, 0)[1:], dtype=np.float64)
@@ -123,9 +134,12 @@ def _legendre(scaled: Array, order: int) -> Array:
 def _levels(variable: Variable, response: Response) -> Candidate:
     """A constant for every distinct value (nests, passes)."""
     levels = np.unique(variable.values)
-    shapes = (variable.values == levels[:, None])[:, None, :]
-    columns = (shapes * response.columns).reshape(1, -1, response.columns.shape[1])
     count = response.columns.shape[0]
+    columns = _of_shapes(
+        count * levels.size,
+        response,
+        lambda: (variable.values == levels[:, None])[:, None, :],
+    )
     unknowns = tuple(
         Unknown(f"{variable.name}.{response.name}{axis + 1}.{level:g}", *response.scale(axis))
         for level in levels
@@ -153,8 +167,11 @@ def _periodic(variable: Variable, response: Response) -> Candidate:
         shapes = np.concatenate([np.sin(phase), np.cos(phase)], axis=1)
         return np.asarray(shapes * np.concatenate([response.columns, response.columns]))
 
-    columns = waves(frequencies)
     count = response.columns.shape[0]
+    columns = Columns(
+        (frequencies.size, 2 * count, response.columns.shape[1]),
+        lambda first, last: waves(frequencies[first:last]),
+    )
     unknowns = tuple(
         Unknown(f"{variable.name}.{response.name}{axis + 1}.{wave}", *response.scale(axis))
         for wave in ("sin", "cos")

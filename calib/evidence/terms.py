@@ -5,21 +5,20 @@ is looked at again, and so on until none adds more than e^3 (sparse regression b
 selection; the evidence pays for a formula's number of unknowns and of trials). The selection is
 repeated on complementary halves of the poses (Shah and Samworth 2013): a term is stable if it, or
 one that the readings cannot tell from it, is selected in most halves.
-
-A half S of the readings has its own fit: with slope J_S e_S - J e (the gradient of the part left
-out, priors included) its residual is e_S - J_S^T N_S^-1 (J_S e_S - J e).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from calib.arrays import Array, BoolArray, IntArray
 from calib.evidence.bayes import observed
 from calib.evidence.candidate import Candidate
+from calib.evidence.halves import Half, all_joined, halves_of
 from calib.evidence.problem import LinearProblem
 from calib.evidence.rounds import joining
+from calib.evidence.scored import Scored
 from calib.evidence.scores import Scores, score
 
 ENOUGH = 3.0
@@ -84,73 +83,88 @@ def select_terms(
     rng : numpy Generator
         Draws the halves.
     """
-    chosen, signatures = _forward(problem, library, rng)
+    scores = score(problem, library, rng, 0)
+    library = scores.candidates
+    chosen, signatures = _forward(scores, rng)
     if not chosen:
         return []
-    votes = np.zeros(len(chosen))
     count = int(poses.max()) + 1
-    for _ in range(pairs):
-        first = rng.permutation(count)[: count // 2]
-        inside = np.isin(poses, first)
-        for half in (inside | (poses < 0), ~inside):
-            found, others = _forward(*_half(problem, library, half), rng)
-            for number, signature in enumerate(signatures):
-                votes[number] += any(
-                    index == chosen[number][0] or _alike(problem, signature, other, half)
-                    for (index, _, _), other in zip(found, others, strict=True)
-                )
+    firsts = [np.isin(poses, rng.permutation(count)[: count // 2]) for _ in range(pairs)]
+    votes = np.zeros(len(chosen))
+    for half, found, others in _forward_each(halves_of(problem, library, poses < 0, firsts)):
+        for number, signature in enumerate(signatures):
+            votes[number] += any(
+                index == chosen[number][0] or _alike(problem, signature, other, half)
+                for (index, _, _), other in zip(found, others, strict=True)
+            )
     return [
         Selected(index, evidence, float(vote) / (2 * pairs), trial, problem.project(signature))
         for (index, evidence, trial), vote, signature in zip(chosen, votes, signatures, strict=True)
     ]
 
 
-def _half(
-    problem: LinearProblem, library: Sequence[Candidate], half: BoolArray
-) -> tuple[LinearProblem, list[Candidate]]:
-    """The problem and the library on some of the components."""
-    jacobian = problem.jacobian[:, half]
-    slope = jacobian @ problem.residual[half] - problem.jacobian @ problem.residual
-    live = None if problem.live is None else problem.live[half]
-    empty = LinearProblem(problem.residual[half], jacobian, problem.prior_precision, live)
-    residual = problem.residual[half] - empty.absorbed.T @ empty.whitened_step(slope)
-    own = [replace(one, columns=np.ascontiguousarray(one.columns[:, :, half])) for one in library]
-    return LinearProblem(residual, jacobian, problem.prior_precision, live), own
+Found = list[tuple[int, float, tuple[float, ...]]]
+"""Terms, evidence, trials, in the order in which they were called for."""
 
 
-def _forward(
-    problem: LinearProblem, library: Sequence[Candidate], rng: np.random.Generator
-) -> tuple[list[tuple[int, float, tuple[float, ...]]], list[Array]]:
-    """Forward selection: (term, evidence, trial) in order, and the terms' signatures (R,)."""
-    scores = score(problem, library, rng, 0)
-    found: list[tuple[int, float, tuple[float, ...]]] = []
+def _forward(scores: Scores, rng: np.random.Generator) -> tuple[Found, list[Array]]:
+    """Forward selection over all readings: terms, and their signatures (R,)."""
+    found: Found = []
     signatures: list[Array] = []
-    while len(found) < MOST_TERMS:
-        taken = {index for index, _, _ in found}
-        left = [index for index in range(len(library)) if index not in taken]
-        if not left:
-            break
-        best = max(left, key=lambda index: observed(scores, index)[0])
-        evidence, parts = observed(scores, best)
-        if evidence < ENOUGH:
-            break
-        trial = int(np.argmax(parts[0][:, 0]))
-        signatures.append(_signature(scores, best, trial))
-        found.append((best, evidence, library[best].trials[trial]))
-        scores = scores.without(*joining(scores, best), rng)
+    while (best := _next(scores, found)) is not None:
+        signatures.append(_signature(scores, best))
+        if len(found) < MOST_TERMS:
+            scores = scores.without(*joining(scores, best), rng)
     return found, signatures
 
 
-def _signature(scores: Scores, index: int, trial: int) -> Array:
-    beta, _ = scores.estimate(index, trial, scores.candidates[index].hypotheses[0])
-    return np.asarray(beta @ scores.candidates[index].columns[trial])
+def _forward_each(halves: Sequence[Half]) -> list[tuple[BoolArray, Found, list[Array]]]:
+    """The same on every half, all in step; components that are in, terms, signatures (R,)."""
+    answers: list[tuple[BoolArray, Found, list[Array]]] = [(one.inside, [], []) for one in halves]
+    going = list(enumerate(halves))
+    for _ in range(MOST_TERMS):
+        chosen = [
+            (number, half, best)
+            for number, half in going
+            if (best := _next(half, answers[number][1])) is not None
+        ]
+        for number, half, best in chosen:
+            answers[number][2].append(_signature(half, best) * half.inside)
+        last = all(len(answers[number][1]) == MOST_TERMS for number, _, _ in chosen)
+        if not chosen or last:
+            break
+        enlarged = all_joined(
+            [half for _, half, _ in chosen], [joining(half, best) for _, half, best in chosen]
+        )
+        going = [(number, half) for (number, _, _), half in zip(chosen, enlarged, strict=True)]
+    return answers
+
+
+def _next(scores: Scored, found: Found) -> int | None:
+    """Term with the most evidence, put down behind those ``found``; None where none adds enough."""
+    taken = {index for index, _, _ in found}
+    left = [index for index in range(len(scores.candidates)) if index not in taken]
+    if not left or len(found) == MOST_TERMS:
+        return None
+    best = max(left, key=lambda index: observed(scores, index)[0])
+    evidence, parts = observed(scores, best)
+    if evidence < ENOUGH:
+        return None
+    found.append((best, evidence, scores.candidates[best].trials[int(np.argmax(parts[0][:, 0]))]))
+    return best
+
+
+def _signature(scores: Scored, index: int) -> Array:
+    """Signature (R,) of a whole term at its best trial and estimate."""
+    trial = int(np.argmax(observed(scores, index)[1][0][:, 0]))
+    candidate = scores.candidates[index]
+    beta, _ = scores.estimate(index, trial, candidate.hypotheses[0])
+    return np.asarray(beta @ candidate.columns[trial])
 
 
 def _alike(problem: LinearProblem, signature: Array, other: Array, half: BoolArray) -> bool:
     """Whether two signatures move the readings of a half alike once geometry has had its share."""
-    padded = np.zeros(half.size)
-    padded[half] = other
     one = problem.project(np.where(half, signature, 0.0))
-    two = problem.project(padded)
+    two = problem.project(other)
     norm = float(np.linalg.norm(one) * np.linalg.norm(two))
     return norm > 0.0 and abs(float(one @ two)) > ALIKE * norm

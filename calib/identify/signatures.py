@@ -3,10 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from calib.arrays import Array, BoolArray
-from calib.effects.component import Effect
+from calib.effects.component import Effect, Situation
 from calib.identify.fitting import Fit
 from calib.model.columns import at_trial, channels_known, whitened_columns
 from calib.unknown import Unknown, linear_among
@@ -16,20 +14,32 @@ from calib.unknown import Unknown, linear_among
 class EffectColumns:
     """Signatures of an effect that is not in the model.
 
-    ``columns`` (T, k, 3, N) are whitened derivatives of all readings by the k linear unknowns at
-    each of T trials; ``known`` (N,) marks readings that have its channels.
+    At each of T trials the k linear unknowns have whitened derivatives of all N readings, made
+    when they are asked for; ``known`` (N,) marks readings that have the effect's channels.
     """
 
     effect: Effect
     unknowns: tuple[Unknown, ...]
     trials: tuple[tuple[float, ...], ...]
-    columns: Array
+    situation: Situation
     known: BoolArray
+
+    @property
+    def linear(self) -> BoolArray:
+        """Which of the unknowns are linear."""
+        return linear_among(self.unknowns)
+
+    def at(self, trial: int) -> Array:
+        """Derivatives (k, 3, N) at one of the trials, counted from 0."""
+        values = at_trial(self.unknowns, self.trials[trial])
+        signature = self.effect.signature(self.situation, values)
+        columns = whitened_columns(signature, self.situation)[self.linear]
+        return columns if self.known.all() else columns * self.known
 
     def values(self, trial: tuple[float, ...], amplitudes: Array) -> Array:
         """Values of all unknowns (U,): nonlinear ones at a trial, linear ones as given."""
         values = at_trial(self.unknowns, trial)
-        values[linear_among(self.unknowns)] = amplitudes
+        values[self.linear] = amplitudes
         return values
 
 
@@ -48,14 +58,6 @@ def effect_columns(fit: Fit, effects: Sequence[Effect]) -> list[EffectColumns]:
 
 def columns_at(fit: Fit, effect: Effect, trials: tuple[tuple[float, ...], ...]) -> EffectColumns:
     """Signatures of one effect at given trial values."""
-    rows, situation = fit.model.rows, fit.linear.situation
-    unknowns = effect.unknowns(rows)
-    linear = linear_among(unknowns)
-    columns = np.empty((len(trials), sum(linear), 3, rows.count))
-    for trial, own in zip(trials, columns, strict=True):
-        signature = effect.signature(situation, at_trial(unknowns, trial))
-        own[:] = whitened_columns(signature, situation)[linear]
+    rows = fit.model.rows
     known = channels_known(effect, rows)
-    if not known.all():
-        columns *= known
-    return EffectColumns(effect, unknowns, trials, columns, known)
+    return EffectColumns(effect, effect.unknowns(rows), trials, fit.linear.situation, known)

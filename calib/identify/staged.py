@@ -98,11 +98,14 @@ def _searched(latest: Fit, one: EffectColumns) -> State:
 def _best_trial(latest: Fit, one: EffectColumns) -> tuple[int, Array]:
     """Trial with the largest fall of chi-square, and its amplitudes."""
     problem = latest.problem
-    columns = latest.whiten(one.columns)
-    projected = problem.project(columns)
     sizes = np.array([u.prior_sigma for u in one.unknowns if not u.nonlinear])
-    weight = columns @ projected.swapaxes(1, 2) + np.diag(1.0 / sizes**2)
-    scores = columns @ problem.residual
-    amplitudes = np.linalg.solve(weight, scores[:, :, None])[:, :, 0]
-    best = int(np.argmax(np.sum(amplitudes * scores, axis=1)))
-    return best, amplitudes[best]
+    falls: list[float] = []
+    found: list[Array] = []
+    for trial in range(len(one.trials)):
+        columns = latest.whiten(one.at(trial))
+        weight = columns @ problem.project(columns).T + np.diag(1.0 / sizes**2)
+        scores = columns @ problem.residual
+        found.append(np.asarray(np.linalg.solve(weight, scores)))
+        falls.append(float(found[-1] @ scores))
+    best = int(np.argmax(falls))
+    return best, found[best]

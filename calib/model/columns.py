@@ -1,6 +1,6 @@
 """An effect's signature as whitened derivatives of the readings."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -33,9 +33,15 @@ def whitened_columns(signature: Signature, situation: Situation) -> Array:
     rows = situation.rows
     total: Array | float = 0.0
     if signature.extension is not None:
-        total = _contract(_known(signature.extension), situation.actuator_columns)
+        total = _contract(
+            _known(signature.extension), 3, lambda actuator: situation.actuator_columns[actuator]
+        )
     if signature.parameters is not None:
-        twists = _contract(_known(signature.parameters), situation.parameter_twists)
+        twists = _contract(
+            _known(signature.parameters),
+            6,
+            lambda parameter: situation.twists_of(np.array([parameter]))[0],
+        )
         total = total + through(situation.lever, twists)
     if signature.twist is not None:
         total = total + through(situation.lever, _known(signature.twist))
@@ -52,11 +58,11 @@ def _known(shape: Array) -> Array:
     return shape if np.isfinite(shape).all() else np.nan_to_num(shape)
 
 
-def _contract(shape: Array, twists: Array) -> Array:
-    """Sum over the middle axis: (U, n, N) and (n, k, N) -> (U, k, N), skipping what is zero."""
-    out = np.zeros((shape.shape[0], *twists.shape[1:]))
+def _contract(shape: Array, width: int, twists: Callable[[int], Array]) -> Array:
+    """Sum over the middle axis: (U, n, N) and n of (k, N) -> (U, k, N), skipping what is zero."""
+    out = np.zeros((shape.shape[0], width, shape.shape[2]))
     for unknown, actuator in zip(*np.nonzero(np.any(shape, axis=2)), strict=True):
-        out[unknown] += shape[unknown, actuator] * twists[actuator]
+        out[unknown] += shape[unknown, actuator] * twists(int(actuator))
     return out
 
 

@@ -11,7 +11,7 @@ parameters that have a prior, the effects' unknowns, the setup's (calib.model.se
 frame (dt in mm, then a rotation vector dw in rad about the tracker's axes, R <- exp(dw) R).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -33,6 +33,8 @@ from calib.runs.stack import Rows
 from calib.unknown import Unknown, linear_among
 
 SETTLING_PASSES = 4
+AT_ONCE = 50_000
+"""Parameters times readings whose twists are laid out at once."""
 SETTLED = 1e-8
 """Change of extension, mm or rad, below which effects and pose agree."""
 
@@ -202,7 +204,7 @@ class Model:
             rows=rows,
             passive_home=home_configuration(self.machine).passive[:, 0],
             actuator_twists=jacobians.actuators[:, :, inverse],
-            parameter_twists=jacobians.parameters[:, :, inverse],
+            state_twists=jacobians.parameters,
             base_point=base,
             point=point,
             frame_rotation=seen_from,
@@ -215,18 +217,37 @@ class Model:
         )
         now = replace(state, near=situation)
         signatures = self._signatures(now)
-        parts = [rows.folded(through(situation.lever, situation.parameter_twists[self.free]))]
-        parts += [whitened_columns(signature, situation) for _, signature in signatures]
-        if self.setup.unknowns:
-            parts.append(rows.folded(self.setup.columns(situation, state.setup)))
-        parts += self._frame_columns(turned, situation)
         seen = self._observed(now, settled, point, signatures)
         if seen is None:
             residual = rows.position - point - change_of(signatures, "point", point)
             whitened = apply(rows.whitener, residual)
         else:
             residual, whitened = seen.misfit(rows.position)
-        return Linearised(now, residual, whitened, np.concatenate(parts))
+        return Linearised(now, residual, whitened, self._jacobian(now, signatures, turned))
+
+    def _jacobian(
+        self, state: State, signatures: list[tuple[Array, Signature]], turned: Array
+    ) -> Array:
+        """Whitened derivatives (p, 3, N) by all unknowns at a state that has its situation."""
+        rows, situation = self.rows, state.situation
+        assert situation is not None
+
+        def parts() -> Iterator[Array]:
+            each = max(1, AT_ONCE // max(rows.count, 1))
+            for first in range(0, self.free.size, each):
+                twists = situation.twists_of(self.free[first : first + each])
+                yield rows.folded(through(situation.lever, twists))
+            for _, signature in signatures:
+                yield whitened_columns(signature, situation)
+            if self.setup.unknowns:
+                yield rows.folded(self.setup.columns(situation, state.setup))
+            yield from self._frame_columns(turned, situation)
+
+        jacobian, at = np.empty((self.prior.size, 3, rows.count)), 0
+        for part in parts():
+            jacobian[at : at + len(part)] = part
+            at += len(part)
+        return jacobian
 
     def predict(self, state: State) -> Array:
         """What the tracker should read (3, N), mm, without derivatives.

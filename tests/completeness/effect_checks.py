@@ -141,7 +141,7 @@ def unlike_the_mock(effect: Effect, name: str, hidden: Sequence[HiddenEffect]) -
     rows = fitted.model.rows
     unknowns = effect.unknowns(rows)
     trial = tuple(table.get(u.name, 0.0) for u in unknowns if u.nonlinear)
-    columns = columns_at(fitted, effect, (trial,)).columns[0]
+    columns = columns_at(fitted, effect, (trial,)).at(0)
     linear = [unknown.name for unknown in unknowns if not unknown.nonlinear]
     amounts = np.array([table.get(name, 0.0) for name in linear])
     predicted = rows.in_mm(np.tensordot(amounts, columns, axes=1))

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
-from calib.evidence import Candidate, LinearProblem, fill_missing
+from calib.evidence import Candidate, Columns, LinearProblem, fill_missing
 from calib.unknown import Unknown
 
 FILE = Path(__file__).parents[1] / "data" / "real" / "hangprinter" / "hp4_force_series2.json"
@@ -104,5 +104,5 @@ class Hangprinter:
             if name == "line-flex":
                 whitened = fill_missing(problem, whitened, missing)
             terms = tuple(Unknown(f"{name}.{k}", unit, size) for k in range(len(shapes)))
-            answer.append(Candidate(name, terms, whitened[None]))
+            answer.append(Candidate(name, terms, Columns.of(whitened[None])))
         return answer

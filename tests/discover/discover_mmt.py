@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from calib.evidence import Candidate, LinearProblem
+from calib.evidence import Candidate, Columns, LinearProblem
 from calib.unknown import Unknown
 
 FILE = Path(__file__).parents[1] / "data" / "real" / "mmt" / "k_and_e.dat"
@@ -66,7 +66,9 @@ def problem(fitted):
 def candidates(fitted):
     """Every term that is not fitted; sizes of ten arc seconds."""
     return [
-        Candidate(name, (Unknown(name, "arcsec", 10.0),), columns.reshape(1, 1, -1) / SIGMA)
+        Candidate(
+            name, (Unknown(name, "arcsec", 10.0),), Columns.of(columns.reshape(1, 1, -1) / SIGMA)
+        )
         for name, columns in terms().items()
         if name not in fitted
     ]

@@ -6,6 +6,7 @@ import numpy as np
 
 from calib.evidence import (
     Candidate,
+    Columns,
     Diagnosis,
     LinearProblem,
     Response,
@@ -78,7 +79,7 @@ class Lab:
         columns = columns if columns.ndim == 3 else columns[None]
         terms = tuple(Unknown(f"{name}.{k}", "mm", 2.0) for k in range(columns.shape[1]))
         alone = tuple((k,) for k in range(len(terms))) if name == "backlash" else ()
-        return Candidate(name, terms, columns, trials, alone)
+        return Candidate(name, terms, Columns.of(columns), trials, alone)
 
     def cyclic(self):
         periods = tuple((1.0 / f,) for f in np.linspace(1.0, 5.0, 17))

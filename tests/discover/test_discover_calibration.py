@@ -7,6 +7,7 @@ from scipy import special, stats
 
 from calib.evidence import LinearProblem, diagnose, fill_missing
 from calib.evidence.diagnosis import DRAWS
+from calib.evidence.draws import residuals_of
 from calib.evidence.pairs import power, prefers
 from calib.evidence.tails import log_tail
 from calib.evidence.weighing import chi_squares
@@ -16,7 +17,7 @@ SEED = 20
 
 
 def signature(lab, name, amplitude, unknown=0, trial=0):
-    return amplitude * lab.effects[lab.index(name)].columns[trial, unknown]
+    return amplitude * lab.effects[lab.index(name)].columns[trial][unknown]
 
 
 def judged(lab, hidden, rng, sigma=1.0, structure=True):
@@ -170,7 +171,7 @@ def test_same_seed_same_answer():
 def test_null_draws_have_the_covariance_of_the_residual():
     lab = Lab(1)
     problem = lab.fitted(0.0, np.random.default_rng(2))
-    draws = problem.null_residuals(20000, np.random.default_rng(3))
+    draws = residuals_of(problem, 20000, np.random.default_rng(3)).array()[:, 1:]
     weight = np.eye(problem.rows) - problem.absorbed.T @ problem.absorbed
     np.testing.assert_allclose(np.cov(draws), weight, atol=0.05)
     assert DRAWS % 20 == 19  # so that 5 % is a whole number of draws

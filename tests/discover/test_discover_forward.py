@@ -35,7 +35,7 @@ class Refit:
 
 def hidden(lab, **amplitudes):
     return sum(
-        (a * lab.effects[lab.index(name)].columns[0, 0] for name, a in amplitudes.items()),
+        (a * lab.effects[lab.index(name)].columns[0][0] for name, a in amplitudes.items()),
         np.zeros(lab.geometry.shape[1]),
     )
 

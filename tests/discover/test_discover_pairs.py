@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from discover_synthetic import POSES, Lab
 
-from calib.evidence import Candidate, Response, Variable, diagnose, structure_candidates
+from calib.evidence import Candidate, Columns, Response, Variable, diagnose, structure_candidates
 from calib.evidence.bayes import observed
 from calib.evidence.pairs import prefers, rivals
 from calib.evidence.scores import score
@@ -22,7 +22,7 @@ def chance_and_rivals(amplitude, seed):
     lab = Lab(9)
     names = ["heat", "heat-twin"]
     heat, twin = (lab.index(name) for name in names)
-    shapes = {index: lab.effects[index].columns[0, 0] for index in (heat, twin)}
+    shapes = {index: lab.effects[index].columns[0][0] for index in (heat, twin)}
     problem = lab.fitted(30.0 * shapes[heat], np.random.default_rng(seed))
     scores = score(problem, lab.effects, np.random.default_rng(seed + 100), 199)
     hidden = {index: amplitude * shape for index, shape in shapes.items()}
@@ -48,17 +48,17 @@ def test_discover_pairs_that_the_readings_left_undecided_are_named_whatever_was_
     """Odds of less than four to one in these readings are no decision."""
     lab = Lab(9)
     heat, twin = lab.index("heat"), lab.index("heat-twin")
-    between = 10.0 * (lab.effects[heat].columns[0, 0] + lab.effects[twin].columns[0, 0])
+    between = 10.0 * (lab.effects[heat].columns[0][0] + lab.effects[twin].columns[0][0])
     problem = lab.fitted(between, np.random.default_rng(0), sigma=1e-3)
     scores = score(problem, lab.effects, np.random.default_rng(1), 199)
-    large = {index: 50.0 * lab.effects[index].columns[0, 0] for index in (heat, twin)}
+    large = {index: 50.0 * lab.effects[index].columns[0][0] for index in (heat, twin)}
     assert rivals(scores, heat, [heat, twin], large) == [twin]
 
 
 def lab_with_six(seed):
     """A lab in which heat may also move each fifth of its readings by an amount of its own."""
     lab = Lab(seed)
-    heat = lab.effects[lab.index("heat")].columns[0, 0]
+    heat = lab.effects[lab.index("heat")].columns[0][0]
     parts = np.array([np.where(np.arange(heat.size) % 5 == k, heat, 0.0) for k in range(5)])
     lab.effects.append(lab.effect("heat-apart", parts))
     return lab, heat, parts
@@ -113,7 +113,7 @@ def test_discover_unknown_structure_must_beat_the_effects_by_far():
         for seed in range(6):
             lab, generator = Lab(60 + seed), np.random.default_rng(seed)
             shape = lab.one(lab.direction[0], 0)
-            known = Candidate("play", (Unknown("play", "mm", 0.02),), shape[None, None])
+            known = Candidate("play", (Unknown("play", "mm", 0.02),), Columns.of(shape[None, None]))
             axis = Response("axis", lab.one(np.ones(POSES), 0)[None], size=2.0)
             anyhow = structure_candidates(
                 [Variable("direction", np.tile(lab.direction[0], 2), (axis,))]

@@ -9,7 +9,7 @@ from discover_synthetic import POSES, Lab
 
 from app.files.runs import read_runs
 from calib.discover.terms import library, propose
-from calib.evidence import Candidate
+from calib.evidence import Candidate, Columns
 from calib.evidence.terms import select_terms
 from calib.formulas.effect_file import effect_from_text
 from calib.identify import fit
@@ -23,7 +23,7 @@ RUNS = Path(__file__).parents[1] / "data" / "runs"
 def term(name, columns, trials=((),)):
     columns = columns if columns.ndim == 3 else columns[None]
     names = tuple(Unknown(f"{name}.{k}", "mm", 2.0) for k in range(columns.shape[1]))
-    return Candidate(name, names, columns, trials)
+    return Candidate(name, names, Columns.of(columns), trials)
 
 
 def offered(lab):
