@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from calib.arrays import BoolArray, IntArray
+from calib.arrays import Array, BoolArray, IntArray
 from calib.chance import poisson_at_least
 from calib.look.digits import decimals_of
 from calib.runs.record import Run
@@ -77,11 +77,12 @@ def _twice(run: Run) -> tuple[BoolArray, Remark | None]:
 def _stale(run: Run) -> tuple[BoolArray, Remark | None]:
     """Readings that did not change when the SMR did."""
     before, _ = _pairs(run)
+    span = _span(run)
     which = np.zeros(run.line.size, dtype=bool)
     for row, last in enumerate(before):
         if last < 0 or not np.array_equal(run.position[:, row], run.position[:, last]):
             continue
-        which[row] = which[last] or _elsewhere(run, row, int(last))
+        which[row] = which[last] or _elsewhere(run, row, int(last), span)
     if not which.any() or _agreement(run) > BY_CHANCE:
         return np.zeros_like(which), None
     lines = ranges(run.line[which], run.line[run.measured])
@@ -105,8 +106,9 @@ def _same(run: Run) -> tuple[BoolArray, Remark | None]:
     groups: dict[bytes, list[int]] = {}
     for row in np.flatnonzero(run.measured):
         groups.setdefault(run.position[:, row].tobytes(), []).append(int(row))
+    span = _span(run)
     for rows in groups.values():
-        if any(_elsewhere(run, row, rows[0]) for row in rows):
+        if any(_elsewhere(run, row, rows[0], span) for row in rows[1:]):
             which[rows] = True
     if not which.any() or _agreement(run) > BY_CHANCE:
         return np.zeros_like(which), None
@@ -177,11 +179,18 @@ def _one_stop(run: Run, row: int, last: int) -> bool:
     return run.nest[row] == run.nest[last] and np.array_equal(run.q[:, row], run.q[:, last])
 
 
-def _elsewhere(run: Run, row: int, last: int) -> bool:
-    """Whether the SMR stood clearly elsewhere at two readings: steps of some um may not show."""
+def _span(run: Run) -> Array:
+    """How far each actuator (n,) goes in a run."""
+    return np.asarray(np.ptp(run.q[:, run.measured], axis=1))
+
+
+def _elsewhere(run: Run, row: int, last: int, span: Array) -> bool:
+    """Whether the SMR stood clearly elsewhere at two readings: steps of some um may not show.
+
+    ``span`` (n,) is how far each actuator goes in the run.
+    """
     if run.nest[row] != run.nest[last]:
         return True
-    span = np.ptp(run.q[:, run.measured], axis=1)
     return bool(np.any(np.abs(run.q[:, row] - run.q[:, last]) > A_STEP * span))
 
 
