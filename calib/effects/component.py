@@ -55,6 +55,8 @@ class Situation:
         Derivative of each reading's components by the point, in mm or rad per mm; whitened
         derivative by a rotation of the platform about the axes of the reading's frame. None where
         all readings are points.
+    read : (3, N), optional
+        What should be read, in the components that are; None where all readings are points.
     """
 
     rows: Rows
@@ -70,6 +72,7 @@ class Situation:
     closing: Machine
     slope: Array | None = None
     turner: Array | None = None
+    read: Array | None = None
 
     @cached_property
     def whitener(self) -> Array:

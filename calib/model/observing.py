@@ -11,7 +11,8 @@ With p the point in the instrument's frame and s the other end of a distance (ze
     tilt            asin(R a . up)          by a rotation w of the platform: w . (R a x up) / cos
     attitude        log(R_read R^T)         by the same: w, to first order
 
-and a constant, where an instrument has one.
+and a constant, where an instrument has one. A gauge, calipers or a bar with a scale of its own show
+(1 + s) times their length, the constant included: what is displayed is too long by a part of it.
 """
 
 from dataclasses import dataclass
@@ -75,13 +76,15 @@ class Ends:
     """What readings refer to, beside the point: other ends (3, N), planes, rotations of platforms.
 
     ``normal`` (3, N) and ``offset`` (N,) are of the plane or direction along which is measured;
-    ``zero`` (N,) constants; ``rotation`` (3, 3, N) of the platform in the frame; ``up`` (3, N).
+    ``zero`` (N,) constants; ``scale`` (N,) parts by which lengths are too long;
+    ``rotation`` (3, 3, N) of the platform in the frame; ``up`` (3, N).
     """
 
     second: Array
     normal: Array
     offset: Array
     zero: Array
+    scale: Array
     rotation: Array
     up: Array
 
@@ -117,7 +120,8 @@ def observe(sensed: Sensed, point: Array, ends: Ends) -> Observed:
     turning[0][:, here] = cross(tilted, ends.up[:, here]) / cosine
     for axis in range(3):
         turning[axis, axis, sensed.turn] = 1.0
-    value[0] += ends.zero
+    value[0] = (value[0] + ends.zero) * (1.0 + ends.scale)
+    slope[0] *= 1.0 + ends.scale
     whitener = np.where(sensed.turn, sensed.turner, sensed.whitener)
     turner = np.einsum("ijn,jkn->ikn", whitener, turning)
     return Observed(sensed, value * sensed.seen, slope, turner, ends.rotation)

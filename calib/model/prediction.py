@@ -214,6 +214,7 @@ class Model:
             closing=settled.closing,
             slope=None if seen is None else seen.slope,
             turner=None if seen is None else seen.turner,
+            read=None if seen is None else seen.value,
         )
         now = replace(state, near=situation)
         signatures = self._signatures(now)

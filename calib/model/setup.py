@@ -2,7 +2,7 @@
 
 Their unknowns stand behind the effects' and before the frames. A nest with a covariance moves along
 its principal axes (along x, y, z where these are independent); a plane along its normal and about
-two axes in it; an instrument's zero is a constant of its readings.
+two axes in it; an instrument's zero is a constant of its readings, its scale a part of them.
 """
 
 from collections.abc import Callable, Iterator
@@ -27,7 +27,7 @@ class SetupUnknown:
     """A number of the setup: where its prior has its mean, and that one's standard deviation.
 
     ``nest`` with ``axis`` (3,); or the number of a ``plane`` and ``part`` (0 along its normal,
-    1 and 2 about an axis in it); or the number of a ``zero``.
+    1 and 2 about an axis in it); or the number of a ``zero`` or of a ``scale``.
     """
 
     name: str
@@ -39,6 +39,7 @@ class SetupUnknown:
     plane: int = -1
     part: int = 0
     zero: int = -1
+    scale: int = -1
 
 
 class SetupUnknowns:
@@ -65,19 +66,17 @@ class SetupUnknowns:
     def ends(self, values: Array, rotation: Array) -> Ends:
         """What the readings refer to; ``rotation`` (3, 3, N) of the platform in the frame."""
         rows, sensed = self.rows, self._sensed
-        normal, offset, zero = sensed.axis.copy(), np.zeros(rows.count), np.zeros(rows.count)
+        normal, offset = sensed.axis.copy(), np.zeros(rows.count)
         for k, named in enumerate(sensed.planes):
             here = sensed.plane == k
             n, d = self._plane(k, values)
             normal[:, here], offset[here] = n[:, None], float(n @ named.plane.through) + d
-        for one, value in zip(self.unknowns, values, strict=True):
-            if one.zero >= 0:
-                zero[sensed.zero == one.zero] += value
         return Ends(
             second=self._shifted(sensed.second, values, self._at_second),
             normal=normal,
             offset=offset,
-            zero=zero,
+            zero=self._of_instruments(values, "zero"),
+            scale=self._of_instruments(values, "scale"),
             rotation=rotation,
             up=self._up,
         )
@@ -87,6 +86,7 @@ class SetupUnknowns:
         rows = self.rows
         out = np.zeros((len(self.unknowns), 3, rows.count))
         scalar = rows.whitener[:, 0]
+        gain = 1.0 + self._of_instruments(values, "scale")
         for own, one in zip(out, self.unknowns, strict=True):
             if one.nest is not None:
                 assert one.axis is not None
@@ -96,10 +96,21 @@ class SetupUnknowns:
                 own[:] = apply(situation.whitener, rotate(situation.frame_rotation, moved))
             elif one.plane >= 0:
                 here = self._sensed.plane == one.plane
-                own[:] = scalar * (self._plane_slope(one, values, situation.point) * here)
+                own[:] = scalar * (self._plane_slope(one, values, situation.point) * here * gain)
+            elif one.zero >= 0:
+                own[:] = scalar * (self._sensed.zero == one.zero) * gain
             else:
-                own[:] = scalar * (self._sensed.zero == one.zero)
+                assert situation.read is not None
+                own[:] = scalar * (situation.read[0] / gain * (self._sensed.scale == one.scale))
         return out
+
+    def _of_instruments(self, values: Array, what: str) -> Array:
+        """Zero or scale (N,) of the instrument of each reading."""
+        found, index = np.zeros(self.rows.count), getattr(self._sensed, what)
+        for one, value in zip(self.unknowns, values, strict=True):
+            if (number := getattr(one, what)) >= 0:
+                found[index == number] = value
+        return found
 
     @property
     def _sensed(self) -> Sensed:
@@ -172,6 +183,8 @@ def _unknowns(sensed: Sensed) -> Iterator[SetupUnknown]:
                 )
     for k, zero in enumerate(sensed.zeros):
         yield SetupUnknown(zero.name, zero.unit, 0.0, zero.sigma, zero=k)
+    for k, scale in enumerate(sensed.scales):
+        yield SetupUnknown(scale.name, scale.unit, 0.0, scale.sigma, scale=k)
 
 
 def _of_nest(nest: SpreadNest) -> Iterator[SetupUnknown]:

@@ -20,11 +20,12 @@ from calib.runs.sensing import (
     KINDS,
     POSE,
     TILT,
-    Instrument,
     Plane,
     Setup,
 )
 
+LENGTHS = (DIRECTION, DISTANCE)
+"""Kinds of one length: a gauge, calipers or a bar may have a scale of its own."""
 BASE = -1
 """Frame of instruments that measure in the base frame."""
 
@@ -53,8 +54,8 @@ class NamedPlane(NamedTuple):
     plane: Plane
 
 
-class Zero(NamedTuple):
-    """A constant that readings of an instrument share: name, unit, standard deviation."""
+class Shared(NamedTuple):
+    """A number that readings of an instrument share: name, unit, standard deviation."""
 
     name: str
     unit: str
@@ -76,8 +77,8 @@ class Blocks(NamedTuple):
 
 
 _ARRAYS = (
-    "kind", "frame", "seen", "axis", "second", "plane", "zero", "attitude", "turn", "ghost", "root",
-    "whitener", "turner",
+    "kind", "frame", "seen", "axis", "second", "plane", "zero", "scale", "attitude", "turn",
+    "ghost", "root", "whitener", "turner",
 )  # fmt: skip
 
 
@@ -98,8 +99,8 @@ class Sensed:
     second, second_name : (3, N), tuple
         The other end of a distance: base frame, or platform frame where both are on it. nan and
         empty where there is none: zero is the instrument.
-    plane, zero : (N,)
-        Which of ``planes`` and ``zeros``; -1 for none.
+    plane, zero, scale : (N,)
+        Which of ``planes``, ``zeros`` and ``scales``; -1 for none.
     attitude, turn : (3, 3, N), (N,) bool
         Of the platform in the instrument's frame, in the blocks that are an attitude.
     ghost, partner : (N,) bool, (N,)
@@ -119,6 +120,7 @@ class Sensed:
     second_name: tuple[str, ...]
     plane: IntArray
     zero: IntArray
+    scale: IntArray
     attitude: Array
     turn: BoolArray
     ghost: BoolArray
@@ -128,7 +130,8 @@ class Sensed:
     turner: Array
     frames: tuple[FrameOf, ...]
     planes: tuple[NamedPlane, ...]
-    zeros: tuple[Zero, ...]
+    zeros: tuple[Shared, ...]
+    scales: tuple[Shared, ...]
     nests: tuple[SpreadNest, ...]
 
     def take(self, chosen: IntArray) -> "Sensed":
@@ -177,18 +180,20 @@ def sensed(runs: Sequence[Run], blocks: Sequence[Blocks]) -> Sensed | None:
         frames=tuple(found.frames),
         planes=tuple(found.planes.values()),
         zeros=tuple(found.zeros),
+        scales=tuple(found.scales),
         nests=tuple(found.nests.values()),
         **{name: np.concatenate([part[name] for part in parts], axis=-1) for name in _ARRAYS},
     )
 
 
 class _Listed:
-    """Frames, planes, zeros and nests of all runs: geometry is shared, frames and zeros are not."""
+    """What all runs refer to: geometry is shared; frames, zeros and scales are not."""
 
     def __init__(self) -> None:
         self.frames: list[FrameOf] = []
         self.planes: dict[str, NamedPlane] = {}
-        self.zeros: list[Zero] = []
+        self.zeros: list[Shared] = []
+        self.scales: list[Shared] = []
         self.nests: dict[str, SpreadNest] = {}
 
     def part(self, index: int, run: Run, blocks: Blocks) -> dict[str, Any]:
@@ -211,6 +216,7 @@ class _Listed:
                 "second_name": ("",) * count,
                 "plane": np.full(count, -1, dtype=np.intp),
                 "zero": np.full(count, -1, dtype=np.intp),
+                "scale": np.full(count, -1, dtype=np.intp),
                 "attitude": np.repeat(np.eye(3)[:, :, None], count, axis=2),
                 "turn": turn,
                 "ghost": ghost,
@@ -238,6 +244,7 @@ class _Listed:
             "second_name": second_name,
             "plane": self._plane(setup, [sensing.plane[row] for row in rows]),
             "zero": self._zero(index, setup, kind, instrument),
+            "scale": self._scale(index, setup, kind, instrument),
             "attitude": sensing.attitude[:, :, rows],
             "turn": turn,
             "ghost": ghost,
@@ -270,7 +277,7 @@ class _Listed:
         own: dict[str, int] = {}
         frame = np.full(kind.size, BASE, dtype=np.intp)
         for row, name in enumerate(instrument):
-            of = setup.instruments.get(name, Instrument())
+            of = setup.of(name)
             if kind[row] == TILT or second[row] or of.frame == "base":
                 continue  # measured in the base frame, or between two nests
             if name not in own:
@@ -290,19 +297,45 @@ class _Listed:
     def _zero(
         self, index: int, setup: Setup, kind: IntArray, instrument: Sequence[str]
     ) -> IntArray:
-        zero = np.full(kind.size, -1, dtype=np.intp)
-        own: dict[str, int] = {}
-        for row, name in enumerate(instrument):
-            sigma = setup.instruments.get(name, Instrument()).zero_sigma
-            if sigma is None or kind[row] not in (DIRECTION, DISTANCE, TILT):
-                continue
-            if name not in own:
-                own[name] = len(self.zeros)
-                before = f"run{index + 1}." if index else ""
-                unit = "rad" if kind[row] == TILT else "mm"
-                self.zeros.append(Zero(f"{before}{name}.zero", unit, sigma))
-            zero[row] = own[name]
-        return zero
+        before = f"run{index + 1}." if index else ""
+        return _listed(
+            self.zeros,
+            [
+                Shared(
+                    f"{before}{name}.zero",
+                    "rad" if of == TILT else "mm",
+                    sigma,
+                )
+                if (sigma := setup.of(name).zero_sigma) is not None
+                and of in (DIRECTION, DISTANCE, TILT)
+                else None
+                for name, of in zip(instrument, kind, strict=True)
+            ],
+        )
+
+    def _scale(
+        self, index: int, setup: Setup, kind: IntArray, instrument: Sequence[str]
+    ) -> IntArray:
+        before = f"run{index + 1}." if index else ""
+        return _listed(
+            self.scales,
+            [
+                Shared(f"{before}{name}.scale", "1", sigma)
+                if (sigma := setup.of(name).scale_sigma) is not None and of in LENGTHS
+                else None
+                for name, of in zip(instrument, kind, strict=True)
+            ],
+        )
+
+
+def _listed(known: list[Shared], wanted: Sequence[Shared | None]) -> IntArray:
+    """Index of each in a list to which those that are new are added, by name; -1 for None."""
+    names = [one.name for one in known]
+    for one in wanted:
+        if one is not None and one.name not in names:
+            names.append(one.name)
+            known.append(one)
+    return np.array([-1 if one is None else names.index(one.name) for one in wanted], dtype=np.intp)
 
 
 def _whiteners(covariance: Array, seen: BoolArray) -> tuple[Array, Array, Array]:

@@ -35,12 +35,15 @@ class Instrument:
     zero_sigma : float or None
         Standard deviation, mm or rad, of a constant that all its readings of one component share:
         only changes are measured. None: its zero is exact.
+    scale_sigma : float or None
+        Standard deviation of what its lengths are too long by, as a part of them. None: exact.
     """
 
     frame: str = "free"
     near: Array | None = None
     axis: Array | None = None
     zero_sigma: float | None = None
+    scale_sigma: float | None = None
     model: str = ""
 
 
@@ -68,6 +71,10 @@ class Setup:
     instruments: Mapping[str, Instrument] = field(default_factory=dict)
     planes: Mapping[str, Plane] = field(default_factory=dict)
     nests: Mapping[str, Array] = field(default_factory=dict)
+
+    def of(self, instrument: str) -> Instrument:
+        """An instrument by its name; one of which nothing is said where it is not listed."""
+        return self.instruments.get(instrument, Instrument())
 
 
 @dataclass(frozen=True, eq=False)

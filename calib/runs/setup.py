@@ -70,12 +70,13 @@ def setup_of(top: TomlTable, spreads: Mapping[str, Array]) -> Setup:
 
 
 def _instrument(table: TomlTable) -> Instrument:
-    table.only("frame", "near", "axis", "zero_sigma", "model")
+    table.only("frame", "near", "axis", "zero_sigma", "scale_sigma", "model")
     return Instrument(
         frame=table.choice("frame", ("free", "base"), "free"),
         near=np.array(table.numbers("near", 6)) if table.has("near") else None,
         axis=_unit(table, "axis") if table.has("axis") else None,
         zero_sigma=table.optional_number("zero_sigma", above=0.0),
+        scale_sigma=table.optional_number("scale_sigma", above=0.0),
         model=table.text("model", ""),
     )
 

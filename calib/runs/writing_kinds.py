@@ -40,6 +40,7 @@ def setup_table(setup: Setup, table: dict[str, Any]) -> str:
                 **({"near": one.near.tolist()} if one.near is not None else {}),
                 **({"axis": one.axis.tolist()} if one.axis is not None else {}),
                 **({"zero_sigma": one.zero_sigma} if one.zero_sigma is not None else {}),
+                **({"scale_sigma": one.scale_sigma} if one.scale_sigma is not None else {}),
                 **({"model": one.model} if one.model else {}),
             }
             for name, one in setup.instruments.items()

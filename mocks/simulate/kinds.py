@@ -84,10 +84,10 @@ class Laboratory:
         self._write("point", by, nest, cells)
 
     def direction(
-        self, nest: str, axis: Array, sigma: float, *, by: str, zero: float = 0.0
+        self, nest: str, axis: Array, sigma: float, *, by: str, zero: float = 0.0, long: float = 0.0
     ) -> None:
-        """Read a dial gauge along an axis of its frame."""
-        along = float(axis @ self._stand(by).of(self.where(nest))) + zero
+        """Read a dial gauge along an axis of its frame, which shows too much by a part ``long``."""
+        along = (float(axis @ self._stand(by).of(self.where(nest))) + zero) * (1.0 + long)
         cells = dict(zip(("ax", "ay", "az"), axis.tolist(), strict=True))
         self._write("direction", by, nest, {**cells, **self._scalar(along, sigma)})
 
@@ -107,10 +107,12 @@ class Laboratory:
         length = math.sqrt(float(apart @ apart)) + zero
         self._write("distance", by, nest, {"nest2": other, **self._scalar(length, sigma)})
 
-    def marks(self, nest: str, first: str, second: str, sigma: float, *, by: str = "") -> None:
+    def marks(
+        self, nest: str, first: str, second: str, sigma: float, *, by: str = "", long: float = 0.0
+    ) -> None:
         """Read how far apart the marks are that a nest has left at two poses (calipers)."""
         apart = self._stood[nest, first] - self._stood[nest, second]
-        cells = self._scalar(math.sqrt(float(apart @ apart)), sigma)
+        cells = self._scalar(math.sqrt(float(apart @ apart)) * (1.0 + long), sigma)
         self._write("distance", by, nest, {"pose": first, "pose2": second, **cells})
 
     def angles(self, nest: str, sigma: float, *, by: str, only: str = "both") -> None:

@@ -56,9 +56,10 @@ def everything(
             "tracker": {},
             "theodolite": {"near": [0.1 * size, 0.2 * size, -2.0 * size, 0.0, 0.0, 0.5]},
             "camera": {},
-            "gauge": {"frame": "base", "zero_sigma": 1.0},
+            "gauge": {"frame": "base", "zero_sigma": 1.0, "scale_sigma": 1e-3},
             "probe": {"frame": "base"},
             "bar": {},
+            "calipers": {"scale_sigma": 1e-3},
             "level": {"frame": "base", "zero_sigma": 1e-3},
         },
         "planes": {
@@ -105,13 +106,13 @@ def everything(
         lab.point("p2", 0.01, by="tracker", only="xy", vague=1000.0)
         lab.distance("p3", "", 0.02, by="tracker")
         lab.pose("p1", 0.02, 2e-5, by="camera")
-        lab.direction("p2", SLANTED, 0.003, by="gauge", zero=0.7)
+        lab.direction("p2", SLANTED, 0.003, by="gauge", zero=0.7, long=4e-4)
         lab.touch("p3", "bed", normal, np.array([0.0, 0.0, -3.0 * size]), 0.004, by="probe")
         lab.distance("p1", "anchor", 0.01, by="bar")
         lab.distance("b1", "p2", 0.01, by="bar")
         lab.tilt("p1", np.array([1.0, 0.0, 0.0]), 2e-5, by="level", zero=4e-4)
     lab.marks("p1", "0", "2", 0.01, by="bar")
-    lab.marks("p3", "1", "2", 0.01, by="bar")
+    lab.marks("p3", "1", "2", 0.01, by="calipers", long=-5e-4)
     lab.distance("p1", "p3", 0.002, by="bar")
     lab.distance("b2", "anchor", 0.01, by="bar")
     return lab
