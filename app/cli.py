@@ -21,7 +21,7 @@ TASKS = (
         "Know the machine",
         ("machine", "kinematics", "poses", "design", "sensitivity", "identifiability"),
     ),
-    ("Measure", ("site", "measure", "resume", "attach", "import")),
+    ("Measure", ("site", "measure", "resume", "attach", "enter", "import")),
     ("Identify", ("fit", "compare", "predict")),
     ("Find what the model misses", ("diagnose", "discover")),
     (

@@ -37,6 +37,7 @@ ASKED: dict[str, tuple[str, ...] | None] = {
     "identifiability": ("identifiability", "tripod"),
     "measure": None,
     "resume": None,
+    "enter": None,
     "import": (
         *("import", f"{RUN}/points.csv", "--map", f"{MAPS}/own-points.toml"),
         *("--header", f"{RUN}/run.toml", "--out", "{}/imported"),
