@@ -140,7 +140,7 @@ def check_conventions(machine: Machine, given: Run, places: Places | None, than:
     Misread
         Saying which way that is, and how many readings it explains.
     """
-    now = 0 if places is None else int(places.majority[1].sum())
+    now = 0 if places is None else places.strict.standing
     count = given.readings
     if now >= NOWHERE * count:
         return
@@ -192,7 +192,7 @@ def _best(machine: Machine, tried: Iterator[Way], least: int) -> tuple[Way | Non
         places = places_of(machine, way.run)
         if places is None:
             continue
-        count = int(places.majority[1].sum())
+        count = places.strict.standing
         if count > most:
             best, most = way, count
             if count == places.rows.count:
@@ -270,7 +270,7 @@ def _of_coordinates(machine: Machine, run: Run) -> Iterator[Way]:
             q[k] = mirror - q[k]
             yield Way(
                 "q",
-                f"q{k + 1} ({name}) has the wrong sign about {of}",
+                f"q{k + 1}{_called(name)} has the wrong sign about {of}",
                 f"Turn the sign of q{k + 1} round",
                 replace(run, q=q),
             )
@@ -280,7 +280,7 @@ def _of_coordinates(machine: Machine, run: Run) -> Iterator[Way]:
             q[[a, b]] = q[[b, a]]
             yield Way(
                 "q",
-                f"q{a + 1} and q{b + 1} ({names[a]} and {names[b]}) are exchanged",
+                f"q{a + 1} and q{b + 1}{_called(names[a], names[b])} are exchanged",
                 f"Exchange the columns q{a + 1} and q{b + 1}",
                 replace(run, q=q),
             )
@@ -290,10 +290,16 @@ def _of_coordinates(machine: Machine, run: Run) -> Iterator[Way]:
             q[k] += np.radians(degrees)
             yield Way(
                 "q",
-                f"the zero of q{k + 1} ({name}) is {-degrees} deg from that of the machine file",
+                f"the zero of q{k + 1}{_called(name)} is {-degrees} deg from that of the machine "
+                "file",
                 f"Add {degrees} deg to q{k + 1}",
                 replace(run, q=q),
             )
+
+
+def _called(*names: str) -> str:
+    """Names of actuators in brackets, where they are not those of their columns."""
+    return "" if all(name.startswith("q") for name in names) else f" ({' and '.join(names)})"
 
 
 def _two_ways(run: Run) -> Iterator[Way]:

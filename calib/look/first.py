@@ -5,7 +5,7 @@ machine (where the readings stand), then against a fit (what is left). What is c
 the analysis and said; nothing is changed in the files.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from calib.arrays import Array
@@ -34,11 +34,16 @@ from calib.runs.record import Run
 from calib.runs.remark import Remark
 from calib.runs.stack import Rows, stack
 
-HYPOTHESES = (
+_Hypothesis = Callable[[Places], Proposal | None]
+HYPOTHESES: tuple[_Hypothesis, ...] = (
     other_labels, moved_station, mirrored_table, displaced_seat, any_labels, turned_table,
     slid_rows, held_actuator,
 )  # fmt: skip
 """What may explain readings that stand in no nest; the first that explains all is taken."""
+OF_TABLES = tuple(one for one in HYPOTHESES if one is not moved_station)
+"""What may make a machine seem off as a whole; a moved station is no other than such a machine."""
+NEARLY = 0.9
+"""Part of the readings that one of these must then explain by the tolerances alone."""
 ONCE_MORE = {"station-moved", "smr-size", "range-step"}
 """What a fit says in place of the one step of the frame that the nominal machine showed."""
 MOST_ROUNDS = 4
@@ -135,14 +140,16 @@ def _places(machine: Machine, run: Run) -> tuple[list[Run], list[Remark], _Known
         if places is None:
             check_conventions(machine, run, None)
             break
-        _, inside = places.majority
-        count = int(inside.sum())
         check_columns(places)
-        if inside.size - count < places.limit:
-            break
-        best = _best(places, count)
-        if not remarks:
-            check_conventions(machine, run, places, 0 if best is None else best.explained)
+        best = _despite_slack(places)
+        if best is None:
+            if places.rows.count - places.standing < places.limit:
+                if not remarks:  # a machine that seems off as a whole may be read otherwise
+                    check_conventions(machine, run, places)
+                break
+            best = _best(places, HYPOTHESES)
+            if not remarks:
+                check_conventions(machine, run, places, 0 if best is None else best.explained)
         if best is None:
             break
         meant, remark = best.take()
@@ -156,14 +163,23 @@ def _places(machine: Machine, run: Run) -> tuple[list[Run], list[Remark], _Known
     return [run], remarks, {}
 
 
-def _best(places: Places, count: int) -> Proposal | None:
-    """The proposal that explains most readings, where it explains clearly more than ``count``."""
+def _despite_slack(places: Places) -> Proposal | None:
+    """What explains nearly all by the tolerances alone, where the machine seems off as a whole."""
+    strict = places.strict
+    if strict is places or strict.standing >= NEARLY * strict.rows.count:
+        return None
+    best = _best(strict, OF_TABLES)
+    return best if best is not None and best.explained >= NEARLY * strict.rows.count else None
+
+
+def _best(places: Places, hypotheses: Sequence[_Hypothesis]) -> Proposal | None:
+    """The proposal that explains most readings, where it explains clearly more than there stand."""
     best: Proposal | None = None
-    for propose in HYPOTHESES:
+    for propose in hypotheses:
         if best is not None and best.explained > places.rows.count - places.limit:
             break
         found = propose(places)
-        if found is None or found.explained < count + places.limit:
+        if found is None or found.explained < places.standing + places.limit:
             continue
         if best is None or found.explained > best.explained:
             best = found

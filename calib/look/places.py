@@ -6,7 +6,7 @@ more of them than the record as it stands: one that moves forty readings is trie
 exclusion of forty.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -69,6 +69,18 @@ class Places:
         """Frame that most readings share, and which (N,) stand where they should in it."""
         rotation, position, inside = robust_align(self.base, self.seen, self.slack)
         return (rotation, position), inside
+
+    @cached_property
+    def strict(self) -> "Places":
+        """The same by the tolerances alone: a wrong record makes a machine seem off as a whole."""
+        if np.array_equal(self.slack, self.tight):
+            return self
+        return replace(self, slack=self.tight)
+
+    @property
+    def standing(self) -> int:
+        """How many readings stand where they should in the frame that most share."""
+        return int(self.majority[1].sum())
 
     @cached_property
     def from_base(self) -> Frame | None:

@@ -7,7 +7,7 @@ import numpy as np
 from calib.arrays import Array
 from calib.effects.tracker import rigid_motions
 from calib.identify.fitting import Fit
-from calib.look.scan import excess, scan, whitened
+from calib.look.scan import excess, scan, whitened, with_the_excluded
 from calib.mechanism.rigid import rotate
 from calib.runs.remark import Remark, ranges
 
@@ -56,11 +56,23 @@ def frame_step(fitted: Fit) -> FrameStep | None:
     rivals.append(scan(fitted, slow).fall[0])
     if best < max(max(rivals) + CLEAR, by_tool - CLEAR):
         return None
-    row = int(kept[at])
-    moment = 0.5 * (rows.moment[kept[at - 1]] + rows.moment[row])
+    before, row = _edge(fitted, int(kept[at - 1]), int(kept[at]))
+    moment = 0.5 * (rows.moment[before] + rows.moment[row])
     return FrameStep(
         row, np.concatenate([base.sizes[at], [moment, 1.0]]), best, best < by_tool + CLEAR
     )
+
+
+def _edge(fitted: Fit, before: int, row: int) -> tuple[int, int]:
+    """Last reading before a step and first one after it; excluded ones between go to their side."""
+    whole = with_the_excluded(fitted) if row > before + 1 else fitted
+    kept = np.flatnonzero(whole.accepted)
+    between = np.flatnonzero((kept > before) & (kept <= row))
+    if between.size < 2:
+        return before, row
+    tried = scan(whole, whitened(whole, rigid_motions(whole.linear.situation.base_point)))
+    at = int(between[np.argmax(tried.fall[between])])
+    return int(kept[at - 1]), int(kept[at])
 
 
 def step_remark(fitted: Fit, found: FrameStep) -> Remark:

@@ -37,7 +37,8 @@ ROWS = [
 PLACES = {
     "nests exchanged": MACHINES,
     "nests exchanged from the middle on": MACHINES[:1],
-    "nest table mirrored in x": MACHINES[:1],
+    "nest table mirrored in x": MACHINES,
+    "tracker moved by 10 mm after 5 %": MACHINES[:1],
     "tracker moved by 20 to 50 mm": MACHINES[:2],
     "tracker moved by 10 mm after 95 %": MACHINES[:1],
     "tracker moved by 0.2 to 1 mm": MACHINES[:1],
