@@ -119,7 +119,7 @@ def _way_blocks(way: Way, effects: Sequence[str]) -> list[Block]:
             )
         )
         if all(step.rms_um is not None for step in way.steps):
-            blocks.append(Picture.of(*_staircase(way)))
+            blocks.append(Picture.of(*staircase_figure(way)))
     rivals: dict[str, dict[str, None]] = {}
     for first, *others in way.not_told_apart:
         if first in effects and others:
@@ -133,7 +133,9 @@ def _way_blocks(way: Way, effects: Sequence[str]) -> list[Block]:
     return blocks
 
 
-def _staircase(way: Way) -> tuple[Any, str]:
+def staircase_figure(way: Way) -> tuple[Any, str]:
+    """The staircase as a figure, and the words below it."""
+
     def column(name: str) -> Array:
         return np.array([getattr(step, name) or np.nan for step in way.steps], dtype=float)
 

@@ -5,11 +5,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from app.session.listing import facts_of
+from app.tui.browsing import Browse
 from app.tui.dialogs import Choose, Enter, Pick
 from app.tui.face import Face
 from app.tui.shelf import runs_under
 from app.tui.starting import session_words
 
+BROWSE, TYPE = " browse", " type"
+"""Answers that are no file: none begins with a blank."""
 OVERWRITE, ANOTHER = "overwrite", "another name"
 
 
@@ -24,27 +27,37 @@ def choose_runs(face: Face, then: Callable[[], None]) -> None:
         if answer:
             take(tuple(shlex.split(answer)))
 
-    def type_folders() -> None:
-        text = "Folders of the runs; several, with blanks between them, are fitted together"
-        face.app.push_screen(Enter("Runs", text), entered)
+    def found_in_folders(answer: str | None) -> None:
+        if answer:
+            take((str(Path(answer).parent),))
 
     def picked(answer: str | None) -> None:
-        if answer:
+        if answer == BROWSE:
+            text = "Open folders down to the run.toml of a run, and take it"
+            browse = Browse("Run", text, Path(), lambda path: path.name == "run.toml")
+            face.app.push_screen(browse, found_in_folders)
+        elif answer == TYPE:
+            text = "Folders of the runs; several, with blanks between them, are fitted together"
+            face.app.push_screen(Enter("Runs", text), entered)
+        elif answer:
             take((answer,))
-        elif answer == "":
-            type_folders()
 
     found = [(str(run), session_words(facts_of(run.parent))) for run in runs_under(face.desk.root)]
-    if found:
-        options = [*found, ("", "other runs: type their folders")]
-        face.app.push_screen(Pick("Run", "Runs of sessions, newest first", options), picked)
-    else:
-        type_folders()
+    options = [
+        *found,
+        (BROWSE, "another run: look for it in the folders"),
+        (TYPE, "several runs, or one elsewhere: type their folders"),
+    ]
+    text = "Runs of sessions, newest first" if found else "No session here has a run yet"
+    face.app.push_screen(Pick("Run", text, options), picked)
 
 
 def ask_for_model_file(face: Face) -> None:
     """Ask for a file and write the model there."""
-    text = "File for the effects and parameters found"
+    text = (
+        "File for the effects and parameters found; with .svg, .png or .pdf for the staircase as a "
+        "picture"
+    )
     ask_for_file(
         face, "Save model", text, "model.toml",
         lambda path: face.act(lambda: face.desk.study.save(path)),

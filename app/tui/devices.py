@@ -12,7 +12,9 @@ from textual.widgets import Static
 from app.files.site import Site
 from app.session.events import Connected
 from app.session.listing import SessionFacts, sessions_under
-from app.tui.dialogs import Choose, Enter, Pick, site_candidates
+from app.tui.browsing import Browse
+from app.tui.choosing import BROWSE, TYPE
+from app.tui.dialogs import Choose, Enter, Pick, is_site_file, site_candidates
 from app.tui.face import Face
 from app.tui.next_step import job_steps
 from app.tui.picture import Picture
@@ -108,22 +110,26 @@ class DevicesFace(Face):
 
     def action_open_site(self) -> None:
         """Choose among the site files here, or type a path."""
-        found = [*site_candidates(Path()), ("", "another file: type its path")]
+        found = [
+            *site_candidates(Path()),
+            (BROWSE, "another file: look for it in the folders"),
+            (TYPE, "another file: type its path"),
+        ]
 
         def opened(answer: str | None) -> None:
             if answer:
                 self.act(lambda: self.desk.open_site(Path(answer).expanduser()))
 
         def picked(answer: str | None) -> None:
-            if answer:
-                opened(answer)
-            elif answer == "":
+            if answer == BROWSE:
+                text = "Open folders down to the site file, and take it"
+                self.app.push_screen(Browse("Open site", text, Path(), is_site_file), opened)
+            elif answer == TYPE:
                 self.app.push_screen(Enter("Open site", "Path of the site file"), opened)
+            else:
+                opened(answer)
 
-        if len(found) > 1:
-            self.app.push_screen(Pick("Open site", "Site files found here", found), picked)
-        else:
-            picked("")
+        self.app.push_screen(Pick("Open site", "Site files found here", found), picked)
 
     def action_mock(self) -> None:
         """Ask for the mock's arguments and start it."""

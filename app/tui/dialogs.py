@@ -198,9 +198,15 @@ class Help(Dialog[None]):
 def site_candidates(folder: Path) -> list[tuple[str, str]]:
     """Find site files under a folder (one level deep): path, and what to show."""
     found = sorted({*folder.glob("*.toml"), *folder.glob("*/*.toml")})
-    sites = []
-    for path in found[:200]:
+    return [(str(path), str(path)) for path in found[:200] if is_site_file(path)]
+
+
+def is_site_file(path: Path) -> bool:
+    """Whether a file says that it is a site."""
+    if path.suffix != ".toml":
+        return False
+    try:
         with path.open(encoding="utf-8", errors="replace") as text:
-            if "pkm-site/1" in text.read(400):
-                sites.append((str(path), str(path)))
-    return sites
+            return "pkm-site/1" in text.read(400)
+    except OSError:
+        return False

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 from textual.app import SystemCommand
 from textual.binding import Binding, BindingType
+from textual.events import Event, MouseDown
 from textual.screen import Screen
 
 from app.errors import GateRefused, StoppedByOperator
@@ -172,6 +173,14 @@ class Workbench(Painted[None]):
                 self.notify(words, title="STOP", severity="warning")
 
         self.run_worker(stop(), group="stop", exit_on_error=True)
+
+    async def on_event(self, event: Event) -> None:
+        """Let STOP at the top work by mouse under whatever lies over the screen."""
+        if isinstance(event, MouseDown) and not isinstance(self.screen, Face):
+            for stop in self.screen_stack[0].query("#top-stop"):
+                if stop.region.contains(event.screen_x, event.screen_y):
+                    self.action_stop_all()
+        await super().on_event(event)
 
     def action_show_face(self, mode: str) -> None:
         """Change to another screen."""

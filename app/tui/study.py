@@ -165,13 +165,33 @@ class Study:
         return Way(tuple(steps), tuple(tuple(group) for group in groups))
 
     async def save(self, path: Path) -> None:
-        """Write the fitted model to a file."""
+        """Write the fitted model to a file; with the ending of a picture, the staircase."""
         if self.answer is None:
             raise BadInput("nothing is fitted yet", remedy="Fit a run first")
+        if path.suffix.lower() in PICTURES:
+            await self._draw_staircase(path)
+            return
         from app.files.models import write_model
 
         write_model(path, self.answer.fit, self.way())
         self._picture.write(f"model written to {path}", "good")
+
+    async def _draw_staircase(self, path: Path) -> None:
+        way = self.way()
+        if not way.steps:
+            raise BadInput("there is no staircase yet", remedy="Ask on the Discover screen (4 d)")
+
+        def draw() -> None:
+            from app.report.findings import staircase_figure
+            from app.show.charts import save
+
+            save(staircase_figure(way)[0], path)
+
+        await asyncio.to_thread(draw)
+        self._picture.write(f"staircase drawn in {path}", "good")
+
+
+PICTURES = (".svg", ".png", ".pdf")
 
 
 def _known(value: float) -> float | None:

@@ -9,7 +9,8 @@ import tui_stream as stream
 from textual.command import CommandPalette
 from textual.widgets import Input
 
-from app.tui.dialogs import Ask, Choose, Enter, Help, choice_keys
+from app.tui.browsing import Browse
+from app.tui.dialogs import Ask, Choose, Enter, Help, Pick, choice_keys
 from app.tui.face import Face
 from app.tui.program import FACES, SIDES, Workbench, bindings_of
 from app.tui.widgets.frame import Banner, TopLine
@@ -63,6 +64,22 @@ async def test_stop_key_is_in_sight_on_every_screen(
             stop = bench.screen.query_one(TopLine).query_one("#top-stop")
             assert stop.region.right == size[0]
             assert stop.region.width >= len("STOP ctrl+x")
+
+
+@pytest.mark.long
+async def test_stop_at_the_top_works_by_mouse_whatever_lies_over_it(bench: Workbench) -> None:
+    async with bench.run_test(size=(80, 24)) as pilot:
+        for done, opens in enumerate((None, "m", "ctrl+p"), start=1):
+            if opens is not None:
+                await pilot.press(opens)
+                await pilot.pause(0.3)
+                assert not isinstance(bench.screen, Face)
+            await pilot.click(offset=(74, 0))
+            await pilot.pause(0.3)
+            assert stops(bench) == done
+            if opens == "m":
+                await pilot.press("escape")
+                await pilot.pause(0.1)
 
 
 async def test_number_keys_are_text_inside_a_line(bench: Workbench) -> None:
@@ -192,7 +209,7 @@ async def test_palette_runs_an_action_of_another_screen(bench: Workbench) -> Non
         await pilot.press("enter")
         await pilot.pause(0.5)
         assert bench.current_mode == "fit"
-        assert isinstance(bench.screen, Enter)
+        assert isinstance(bench.screen, Pick | Browse)
 
 
 async def test_help_lists_the_keys_of_the_screen(bench: Workbench) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tui_stream as stream
 from textual.widgets import DataTable
 
 from app.files.residuals import residuals_text
@@ -15,6 +16,7 @@ from app.tui.analysis import identify
 from app.tui.program import Workbench
 from app.tui.reading_lines import by_nest, lines_of_fit
 from app.tui.residuals import ResidualsFace, VectorPanel
+from calib.errors import BadInput
 from calib.identify.readings import MASKED
 
 RUN = Path(__file__).parents[1] / "data" / "runs" / "mystery"
@@ -90,3 +92,17 @@ async def test_a_masked_reading_is_left_out_of_the_next_fit_and_comes_back(tmp_p
         assert bench.current_mode == "fit"
         study.choose(("elsewhere",))
         assert study.masked == ()
+
+
+async def test_the_staircase_is_drawn_into_a_file(tmp_path: Path) -> None:
+    bench = Workbench(root=tmp_path)
+    study = bench.desk.study
+    study.answer = stream.fitted()
+    with pytest.raises(BadInput, match="no staircase"):
+        await study.save(tmp_path / "way.svg")
+    study.search = stream.searched()
+    await study.save(tmp_path / "way.svg")
+    text = (tmp_path / "way.svg").read_text(encoding="utf-8")
+    assert text.rstrip().endswith("</svg>")
+    with pytest.raises(BadInput, match="nothing is fitted"):
+        await Workbench(root=tmp_path).desk.study.save(tmp_path / "model.toml")
