@@ -6,6 +6,11 @@ from collections.abc import Iterable
 
 from calib.errors import BadInput
 
+LARGEST = 1e12
+"""Bound of every number of every file: no length in mm, time in s or count beyond it is meant."""
+
+LONGEST_SHOWN = 80
+
 UNITS = {
     "mm": ("mm", 1.0),
     "um": ("mm", 1e-3),
@@ -20,6 +25,11 @@ UNITS = {
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(rf"({_NUMBER})\s*(?:([A-Za-z]+)(?:\s*/\s*({_NUMBER})?\s*([A-Za-z]+))?)?")
+
+
+def is_meant(value: float) -> bool:
+    """Whether a number can be meant: it is neither nan nor beyond :data:`LARGEST`."""
+    return abs(value) <= LARGEST
 
 
 def is_quantity(text: str) -> bool:
@@ -62,9 +72,19 @@ def measured(value: object, place: str, like: str = "mm") -> tuple[float, str]:
         number, unit = (float(value), "") if not isinstance(value, str) else _parsed(value, place)
     except OverflowError:  # a whole number of hundreds of digits
         number, unit = math.inf, ""
-    if not math.isfinite(number):
-        raise BadInput(f"{value!r} is not finite", place=place, remedy="Give a finite number.")
+    if not is_meant(number):
+        raise BadInput(
+            f"{in_short(value)} is not finite, or beyond every number that can be meant",
+            place=place,
+            remedy=f"Give a number within -{LARGEST:g} and {LARGEST:g}.",
+        )
     return number, unit
+
+
+def in_short(value: object) -> str:
+    """A value as it is written, cut where that would be long."""
+    text = repr(value)
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]} ..."
 
 
 def _parsed(text: str, place: str) -> tuple[float, str]:

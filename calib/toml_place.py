@@ -95,7 +95,9 @@ def load_toml(text: str, source: str) -> dict[str, Any]:
             place = f"{source}, line {found.group(1)}, column {found.group(2)}"
             what = message[: found.start()].strip()
         else:
-            place = f"{source}, line {len(text.splitlines())}"
+            long = re.search(r"\d{4301}", text)
+            last = text[: long.start()] if long else text
+            place = f"{source}, line {len(last.splitlines())}"
             what = message.replace("(at end of document)", "at the end of the file")
         raise BadInput(
             f"not valid TOML: {what}", place=place, remedy="Correct this line"

@@ -6,19 +6,16 @@ that a reference page can be checked against the code that reads the format.
 
 import difflib
 import math
-import sys
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from calib.errors import BadInput
 from calib.plain_text import plain
-from calib.quantity import quantity
+from calib.quantity import LARGEST, in_short, is_meant, quantity
 from calib.toml_faults import Faults, some_number, some_numbers, standing_in
 from calib.toml_place import joined_names, keys_of, line_of, load_toml
 
-LARGEST = sys.float_info.max
-"""Bound of a number that may be as large as it likes but not infinite."""
 ANY_NAME = "NAME"
 """Stands in the paths of asked keys for a name that the writer of a file chooses."""
 
@@ -138,7 +135,7 @@ class TomlTable:
             raise self.wrong("format is missing", "format", remedy=f"{remedy} first")
         value = self._get("format", Asked("text", "", True, None))
         if value not in known:
-            raise self.wrong(f"format is {value!r}", "format", remedy=remedy)
+            raise self.wrong(f"format is {in_short(value)}", "format", remedy=remedy)
         return str(value)
 
     def table(self, key: str, *, required: bool = True) -> "TomlTable":
@@ -166,9 +163,12 @@ class TomlTable:
         missing: BadInput | None = None
         value: Any = {}
         try:
-            value = self._get(key, Asked("table", "", required, None), f"[{key}]") or {}
+            value = self._get(key, Asked("table", "", required, None), f"[{key}]")
+            value = {} if value is None else value
             if not isinstance(value, Mapping):
-                raise self.wrong(f"{key} is {value!r}, not a table", key, remedy=f"Write [{key}]")
+                raise self.wrong(
+                    f"{key} is {in_short(value)}, not a table", key, remedy=f"Write [{key}]"
+                )
         except BadInput as fault:
             if self.faults is None:
                 raise
@@ -186,7 +186,9 @@ class TomlTable:
         if value is None:
             return default or ""
         if not isinstance(value, str):
-            raise self.wrong(f"{key} is {value!r}, not text", key, remedy='Write it in "quotes"')
+            raise self.wrong(
+                f"{key} is {in_short(value)}, not text", key, remedy='Write it in "quotes"'
+            )
         return value
 
     def choice(self, key: str, choices: Collection[str], default: str | None = None) -> str:
@@ -198,8 +200,8 @@ class TomlTable:
         if value not in choices:
             remedy = f"Expected {_either(choices)}"
             if default is None:
-                raise self.wrong(f"{key} is {value!r}", key, remedy=remedy)
-            self.complain(f"{key} is {value!r}", key, remedy=remedy)
+                raise self.wrong(f"{key} is {in_short(value)}", key, remedy=remedy)
+            self.complain(f"{key} is {in_short(value)}", key, remedy=remedy)
             return default
         return value
 
@@ -210,7 +212,7 @@ class TomlTable:
         if value is None:
             return []
         if not isinstance(value, list) or not all(isinstance(one, str) for one in value):
-            raise self.wrong(f"{key} is {value!r}", key, remedy='Write ["...", "..."]')
+            raise self.wrong(f"{key} is {in_short(value)}", key, remedy='Write ["...", "..."]')
         return list(value)
 
     @standing_in(lambda key, default: default)
@@ -220,7 +222,7 @@ class TomlTable:
         if value is None:
             return default
         if not isinstance(value, bool):
-            raise self.wrong(f"{key} is {value!r}", key, remedy="Write true or false")
+            raise self.wrong(f"{key} is {in_short(value)}", key, remedy="Write true or false")
         return value
 
     @standing_in(some_number)
@@ -240,9 +242,11 @@ class TomlTable:
             return float(default or 0.0)
         if not _is_number(value):
             remedy = f"Write a number{f' in {unit}' if unit else ''}"
-            raise self.wrong(f"{key} is {value!r}, not a number", key, remedy=remedy)
+            raise self.wrong(f"{key} is {in_short(value)}, not a number", key, remedy=remedy)
         if above is not None and value <= above:
-            raise self.wrong(f"{key} is {value}", key, remedy=f"It must be greater than {above:g}")
+            raise self.wrong(
+                f"{key} is {in_short(value)}", key, remedy=f"It must be greater than {above:g}"
+            )
         return float(self._within(key, value, least, most))
 
     def optional_number(
@@ -250,8 +254,10 @@ class TomlTable:
     ) -> float | None:
         """Read a number that may be left out without another taking its place."""
         value = self._get(key, Asked("number", unit, False, None))
-        if value is None or (not finite and isinstance(value, float)):
-            return value
+        if value is None:
+            return None
+        if not finite and _is_nan(value):
+            return math.nan
         value = self.number(key, unit=unit, above=above)
         self.note(key, Asked("number", unit, False, None))
         return value
@@ -266,10 +272,10 @@ class TomlTable:
         if value is None:
             return default or 0
         whole = isinstance(value, int) and not isinstance(value, bool)
-        if not whole or value < least or (most is not None and value > most):
+        if not whole or value < least or value > (LARGEST if most is None else most):
             upper = "" if most is None else f" and at most {most}"
             remedy = f"Write a whole number, at least {least}{upper}"
-            raise self.wrong(f"{key} is {value!r}", key, remedy=remedy)
+            raise self.wrong(f"{key} is {in_short(value)}", key, remedy=remedy)
         return int(value)
 
     @standing_in(some_numbers)
@@ -291,12 +297,11 @@ class TomlTable:
             return default or ()
         good = isinstance(value, list) and len(value) == length
         if not good or not all(
-            (_is_number(one) and abs(one) <= most) or (not finite and isinstance(one, float))
-            for one in value
+            (_is_number(one) and abs(one) <= most) or (not finite and _is_nan(one)) for one in value
         ):
             of = f" in {unit}" if unit else ""
             remedy = f"Write {length} finite numbers{of}, as {example}"
-            raise self.wrong(f"{key} is {value!r}", key, remedy=remedy)
+            raise self.wrong(f"{key} is {in_short(value)}", key, remedy=remedy)
         return tuple(float(one) for one in value)
 
     @standing_in(lambda key, unit, default=None, *, least=0.0, most=0.0: default or max(least, 0.0))
@@ -333,15 +338,15 @@ class TomlTable:
         if value is None:
             return default or ()
         if not isinstance(value, list) or len(value) != length:
-            raise self.wrong(f"{key} is {value!r}", key, remedy=f"Write {length} numbers")
+            raise self.wrong(f"{key} is {in_short(value)}", key, remedy=f"Write {length} numbers")
         place = self.place(key)
         return tuple(self._within(key, quantity(one, unit, place), least, most) for one in value)
 
     def _within(self, key: str, value: float, least: float, most: float) -> float:
         if value < least:
-            raise self.wrong(f"{key} is {value}", key, remedy=_bound(least, "at least"))
+            raise self.wrong(f"{key} is {in_short(value)}", key, remedy=_bound(least, "at least"))
         if value > most:
-            raise self.wrong(f"{key} is {value}", key, remedy=_bound(most, "at most"))
+            raise self.wrong(f"{key} is {in_short(value)}", key, remedy=_bound(most, "at most"))
         return value
 
     def limits(self, key: str, unit: str) -> tuple[float, float]:
@@ -361,9 +366,9 @@ class TomlTable:
         table.note("", Asked("number", "", False, None))
         found = joined_names(table._data)
         for name, value in found.items():
-            if not _is_number(value) or abs(value) > LARGEST:
+            if not _is_number(value) or not is_meant(value):
                 raise table.wrong(
-                    f"{name} is {value!r}",
+                    f"{name} is {in_short(value)}",
                     *keys_of(table._data, name),
                     remedy="Expected a finite number",
                 )
@@ -376,7 +381,7 @@ class TomlTable:
         return {
             key: float(value)
             for key, value in self._data.items()
-            if isinstance(value, float) or (isinstance(value, int) and abs(value) <= LARGEST)
+            if isinstance(value, float) or (isinstance(value, int) and is_meant(value))
         }
 
     def place_of_name(self, name: str) -> str:
@@ -408,8 +413,12 @@ def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and value == value
 
 
+def _is_nan(value: object) -> bool:
+    return isinstance(value, float) and math.isnan(value)
+
+
 def _bound(bound: float, words: str) -> str:
-    if abs(bound) == LARGEST or not math.isfinite(bound):
+    if not math.isfinite(bound):
         return "It must be a finite number"
     return f"It must be {words} {bound:g}"
 

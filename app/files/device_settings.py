@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from calib.toml_table import LARGEST, Asked, TomlTable
+from calib.quantity import LARGEST
+from calib.toml_table import Asked, TomlTable
 from drivers.kind import Kind, Setting
 
 

@@ -24,6 +24,8 @@ from calib.unknown import Estimate, Unknown
 
 MODEL_FORMAT = "pkm-model/1"
 FIT_FORMAT = "pkm-fit/1"
+ROUNDED = 1e-6
+"""By how much a correlation may exceed 1 because its digits were cut."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +164,7 @@ def _without_nulls(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def _estimate(entry: TomlTable) -> Estimate:
     value = entry.optional_number("value", finite=False)
     sigma = entry.optional_number("sigma", finite=False)
+    entry.optional_number("nominal", finite=False)
     return Estimate(
         Unknown(entry.text("name"), entry.text("unit", "")),
         math.nan if value is None else value,
@@ -177,7 +180,7 @@ def _correlation(top: TomlTable, names: list[str]) -> Array:
         return correlation
     rows = top.named("correlations")
     for i, name in enumerate(names):
-        row = np.array(rows.numbers(name, i + 1, finite=False), dtype=float)
+        row = np.array(rows.numbers(name, i + 1, most=1.0 + ROUNDED, finite=False), dtype=float)
         correlation[i, : i + 1] = row
         correlation[: i + 1, i] = row
     return correlation

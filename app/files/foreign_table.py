@@ -13,6 +13,7 @@ from pathlib import Path
 
 from calib.errors import BadInput
 from calib.plain_text import plain
+from calib.quantity import is_meant
 from calib.toml_table import TomlTable
 from calib.units import split_header
 
@@ -202,7 +203,7 @@ def parse_number(cell: str, layout: Layout) -> float | None:
     sign, whole, decimals, only, exponent = found.groups()
     whole = (whole or "0").replace(layout.thousands, "") if layout.thousands else whole or "0"
     value = float(f"{sign}{whole}.{decimals or only or '0'}{exponent.lower().replace('d', 'e')}")
-    return value if math.isfinite(value) else None
+    return value if is_meant(value) else None
 
 
 def _remedy(cell: str, layout: Layout) -> str:
@@ -264,7 +265,9 @@ def table_of(text: str, layout: Layout, source: str) -> ForeignTable:
     """The table in a text, see :func:`read_foreign`."""
     lines = text.split("\n")
     if not text.strip():
-        raise BadInput("the file is empty", place=f"{source}, line 1")
+        raise BadInput(
+            "the file is empty", place=f"{source}, line 1", remedy="Name a table with rows"
+        )
     begin = _begin(lines, layout, source)
     notes: list[str] = []
     kept: list[tuple[int, str]] = []

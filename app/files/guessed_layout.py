@@ -25,7 +25,9 @@ def guessed_table(path: Path) -> tuple[ForeignTable, list[str]]:
     text, encoding = _text(path)
     lines = [line for line in text.split("\n")[:_MOST_LINES] if line.strip()]
     if not lines:
-        raise BadInput("the file is empty", place=f"{path}, line 1")
+        raise BadInput(
+            "the file is empty", place=f"{path}, line 1", remedy="Name a table with rows"
+        )
     comments = tuple(
         sign for sign in _COMMENTS if any(line.lstrip().startswith(sign) for line in lines)
     )

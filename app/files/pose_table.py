@@ -9,13 +9,12 @@ mm and rad, platform in the base frame, R = Rz(rz) Ry(ry) Rx(rx); lines that sta
 remarks.
 """
 
-import csv
-import math
 from collections.abc import Mapping
 from pathlib import Path
 
-from app.files.text import read_text
+from app.files.unit_columns import number_in, table_lines
 from calib.errors import BadInput
+from calib.quantity import in_short
 
 Pose = tuple[float, float, float, float, float, float]
 """x, y, z in mm and rx, ry, rz in rad: the platform in the base frame."""
@@ -28,53 +27,39 @@ COLUMNS = ("pose", "x", "y", "z", "rx", "ry", "rz")
 
 def read_poses(path: Path) -> dict[str, Pose]:
     """Read labelled poses; raises :class:`BadInput` with file, line and column."""
-    lines = [
-        (number, line)
-        for number, line in enumerate(read_text(path).splitlines(), start=1)
-        if line.strip() and not line.startswith("#")
-    ]
-    if not lines:
-        raise BadInput("no poses", place=str(path), remedy=f"Start with {','.join(COLUMNS)}")
-    numbers = [number for number, _ in lines]
-    rows = list(csv.reader(line for _, line in lines))
-    if tuple(cell.strip() for cell in rows[0]) != COLUMNS:
+    rows = table_lines(path)
+    place, header = next(rows, (str(path), ()))
+    if not header:
+        raise BadInput("no poses", place=place, remedy=f"Start with {','.join(COLUMNS)}")
+    if tuple(header) != COLUMNS:
         raise BadInput(
-            f"the header is {','.join(rows[0])}",
-            place=f"{path}, line {numbers[0]}",
+            f"the header is {in_short(','.join(header))}",
+            place=place,
             remedy=f"Write {','.join(COLUMNS)}",
         )
     poses: dict[str, Pose] = {}
-    for number, row in zip(numbers[1:], rows[1:], strict=True):
-        place = f"{path}, line {number}"
+    for place, row in rows:
         if len(row) != len(COLUMNS):
-            raise BadInput(f"{len(row)} columns, not {len(COLUMNS)}", place=place)
-        label = row[0].strip()
+            raise BadInput(
+                f"{len(row)} columns, not {len(COLUMNS)}",
+                place=place,
+                remedy=f"Write {','.join(COLUMNS)}",
+            )
+        label = row[0]
         if not label or label == HOME or label in poses:
             raise BadInput(
                 f'label "{label}" is empty, reserved or there already',
                 place=f"{place}, column pose",
                 remedy="Give every pose its own label",
             )
-        poses[label] = _pose(row, place)
+        x, y, z, rx, ry, rz = (
+            number_in(cell, f"{place}, column {name}")
+            for name, cell in zip(COLUMNS[1:], row[1:], strict=True)
+        )
+        poses[label] = x, y, z, rx, ry, rz
     if not poses:
         raise BadInput("a header and no poses", place=str(path), remedy="Add poses")
     return poses
-
-
-def _pose(row: list[str], place: str) -> Pose:
-    values = []
-    for name, cell in zip(COLUMNS[1:], row[1:], strict=True):
-        try:
-            value = float(cell)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise BadInput(
-                f'"{cell}" is not a finite number', place=f"{place}, column {name}"
-            ) from None
-        values.append(value)
-    x, y, z, rx, ry, rz = values
-    return x, y, z, rx, ry, rz
 
 
 def poses_text(poses: Mapping[str, Pose]) -> str:

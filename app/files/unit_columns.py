@@ -13,7 +13,7 @@ from pathlib import Path
 
 from app.files.text import read_text
 from calib.errors import BadInput
-from calib.quantity import UNITS, quantity
+from calib.quantity import LARGEST, UNITS, in_short, is_meant, is_quantity, quantity
 
 _HEAD = re.compile(r"(?P<name>[^\[\]()]*?)\s*(?:[\[(]\s*(?P<unit>[A-Za-z]+)\s*[\])])?\s*")
 
@@ -29,13 +29,24 @@ class Column:
     def number(self, cell: str, place: str) -> float:
         """A cell in mm or rad; raises BadInput for what is no finite number of that kind."""
         where = f"{place}, column {self.name}"
-        try:
-            value = float(cell) * self.factor
-        except ValueError:
-            value = quantity(cell, self.measures, where)
-        if not math.isfinite(value):
-            raise BadInput(f"{cell!r} is not a finite number", place=where, remedy="Write a number")
-        return value
+        if self.measures and is_quantity(cell) and any(map(str.isalpha, cell[-1:])):
+            return quantity(cell, self.measures, where)
+        return number_in(cell, where) * self.factor
+
+
+def number_in(cell: str, place: str) -> float:
+    """A number that can be meant; raises BadInput for anything else, a unit behind it included."""
+    try:
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not is_meant(value):
+        raise BadInput(
+            f"{in_short(cell)} is not a finite number",
+            place=place,
+            remedy=f"Write a number within -{LARGEST:g} and {LARGEST:g}",
+        )
+    return value
 
 
 def column(head: str, measures: dict[str, str], place: str) -> Column:
@@ -66,7 +77,18 @@ def column(head: str, measures: dict[str, str], place: str) -> Column:
 
 
 def table_lines(path: Path) -> Iterator[tuple[str, Sequence[str]]]:
-    """Rows of a CSV file with their places; empty lines and those that start with # are remarks."""
+    """Rows of a CSV file with their places; empty lines and those that start with # are remarks.
+
+    Raises BadInput for a cell that is longer than any can be.
+    """
     for number, line in enumerate(read_text(path).splitlines(), start=1):
         if line.strip() and not line.startswith("#"):
-            yield f"{path}, line {number}", [cell.strip() for cell in next(csv.reader([line]))]
+            place = f"{path}, line {number}"
+            try:
+                yield place, [cell.strip() for cell in next(csv.reader([line]))]
+            except csv.Error as error:
+                raise BadInput(
+                    f"not readable as comma-separated values: {error}",
+                    place=place,
+                    remedy="Look for a line that is two, or a quotation mark",
+                ) from error

@@ -10,23 +10,19 @@ The machine's task coordinates or all six, mm and rad, or in the unit that stand
 Lines that start with # are remarks. The format is described in docs/correct.md.
 """
 
-import csv
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from app.files.poses import read_pose_file
-from app.files.text import read_text
-from app.files.unit_columns import Column, column
+from app.files.unit_columns import Column, column, table_lines
 from calib.arrays import Array
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import Poses
 from calib.mechanism.task import FULL, task_values
-from calib.quantity import is_quantity
 
 NAME, TIME = "pose", "time_s"
 
@@ -49,26 +45,21 @@ def read_wanted(path: Path, machine: Machine) -> Wanted:
     if path.suffix.lower() != ".csv":
         found = read_pose_file(path, machine)
         return Wanted(found.labels, found.pose_set.task)
-    lines = [
-        (number, line)
-        for number, line in enumerate(read_text(path).splitlines(), start=1)
-        if line.strip() and not line.startswith("#")
-    ]
+    lines = list(table_lines(path))
     own = machine.task.coordinates
     if len(lines) < 2:
         raise BadInput(
             "there is no pose", place=str(path), remedy=f"Write a header {_header(own)} and rows"
         )
-    place = f"{path}, line {lines[0][0]}"
+    place, header = lines[0]
     measures = {name: "mm" if name in "xyz" else "rad" for name in (*own, *FULL)}
-    heads = [column(cell, measures, place) for cell in next(csv.reader([lines[0][1]]))]
+    heads = [column(cell, measures, place) for cell in header]
     names = [head.name for head in heads]
     _check_header(names, own, place)
     labels: list[str] = []
     rows: list[dict[str, float]] = []
-    for number, line in lines[1:]:
-        cells = next(csv.reader([line]))
-        label, values = _row(cells, heads, f"{path}, line {number}")
+    for place, cells in lines[1:]:
+        label, values = _row(cells, heads, place)
         labels.append(label or str(len(labels) + 1))
         rows.append(values)
     columns = {name: np.array([row[name] for row in rows]) for name in names if name != NAME}
@@ -102,7 +93,7 @@ def _check_header(names: list[str], own: tuple[str, ...], place: str) -> None:
         )
 
 
-def _row(cells: list[str], heads: list[Column], place: str) -> tuple[str, dict[str, float]]:
+def _row(cells: Sequence[str], heads: list[Column], place: str) -> tuple[str, dict[str, float]]:
     if len(cells) != len(heads):
         raise BadInput(
             f"{len(cells)} cells under {len(heads)} columns", place=place, remedy="Complete it"
@@ -111,19 +102,7 @@ def _row(cells: list[str], heads: list[Column], place: str) -> tuple[str, dict[s
     for head, cell in zip(heads, cells, strict=True):
         name = head.name
         if name == NAME:
-            label = cell.strip()
-            continue
-        if head.measures and is_quantity(cell.strip()):
-            values[name] = head.number(cell.strip(), place)
-            continue
-        try:
-            values[name] = float(cell)
-        except ValueError:
-            values[name] = math.nan
-        if not math.isfinite(values[name]):
-            raise BadInput(
-                f"{cell!r} is not a finite number",
-                place=f"{place}, column {name}",
-                remedy="Write a number",
-            )
+            label = cell
+        else:
+            values[name] = head.number(cell, place)
     return label, values

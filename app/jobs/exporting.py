@@ -180,7 +180,11 @@ def rendered(template: str, found: Corrected, place: str) -> str:
         With the template's line.
     """
     if len(template) > LONGEST_TEMPLATE:
-        raise BadInput("the template is too long", place=place)
+        raise BadInput(
+            f"the template has {len(template)} signs",
+            place=place,
+            remedy=f"At most {LONGEST_TEMPLATE} are taken",
+        )
     environment = SandboxedEnvironment(
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
         keep_trailing_newline=True,

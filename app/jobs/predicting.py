@@ -183,10 +183,19 @@ def _known(
         if held is not None:
             values[k] = saved.estimates[held].value
             select[k, names.index(held)] = 1.0
+            if not np.isfinite(values[k]):
+                raise BadInput(
+                    f"{held} has no value", place=saved.source, remedy="Save the model again"
+                )
         elif np.isfinite(model.prior[k]):
             lacking.append(name)
             own[k] = model.prior[k] ** 2
-    covariance = select @ saved.covariance @ select.T + np.diag(own)
+    unsure = [name for name in names if not np.isfinite(saved.estimates[name].sigma)]
+    if unsure:
+        remarks.append(
+            f"the model file does not say how uncertain {', '.join(unsure[:3])} is: taken as exact"
+        )
+    covariance = select @ np.nan_to_num(saved.covariance) @ select.T + np.diag(own)
     if not saved.correlated:
         remarks.append(
             "the model file has no correlations, so that what is expected is too large or too "

@@ -146,7 +146,9 @@ def _speaking(
         _binned(scores.problem, shown, response, axis, components)
         for axis in range(response.columns.shape[0])
     ]
-    axis = int(np.argmax([sum((b.value / b.sigma) ** 2 for b in bins) for bins in pictures]))
+    # Of a single bin nothing can differ: its sigma is zero.
+    sizes = [sum((b.value / b.sigma) ** 2 for b in bins if b.sigma > 0.0) for bins in pictures]
+    axis = int(np.argmax(sizes))
     return Speaking(
         channel=variable.name,
         acts_on=acts_on,

@@ -131,8 +131,9 @@ class _Reader(LimbReader):
         allowed = (*POSE, *_POINTING)
         if not names or any(name not in allowed for name in names):
             raise task.wrong(
-                "coordinates must be a list of x, y, z, rx, ry, rz, or tilt and azimuth",
+                "coordinates are a list of x, y, z, rx, ry, rz, or tilt and azimuth",
                 "coordinates",
+                remedy='Write coordinates = ["x", "y", "z"], say',
             )
         if len(names) > len(self.actuators) or ("tilt" in names) != ("azimuth" in names):
             raise task.wrong(

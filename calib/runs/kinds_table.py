@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from calib.errors import BadInput
 from calib.mechanism.rigid import from_euler
+from calib.runs.cells import SMALLEST_SIGMA, meant_in
 from calib.runs.header import Header
 from calib.runs.points import (
     COVARIANCES,
@@ -17,7 +18,6 @@ from calib.runs.points import (
     Array,
     _check_nests,
     _check_time,
-    _number,
     _Table,
 )
 from calib.runs.record import Run
@@ -208,8 +208,8 @@ class _Reader:
         cell = self.text(row, name)
         if not cell:
             return None
-        value = _number(cell)
-        if value is None or not math.isfinite(value):
+        value = meant_in(cell)
+        if value is None:
             raise self.table.wrong(row, name, "a finite number, or an empty field")
         return value
 
@@ -223,7 +223,7 @@ class _Reader:
         value = self.number(row, name)
         if value is None:
             raise self.fault(row, name, f"{of} has no standard uncertainty {name}")
-        if value <= 0.0:
+        if value < SMALLEST_SIGMA:
             raise self.table.wrong(row, name, "a standard uncertainty, larger than zero")
         return value
 

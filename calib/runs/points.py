@@ -1,7 +1,6 @@
 """``points.csv``: one row a tracker reading; every fault named with line and column."""
 
 import csv
-import math
 import re
 from collections.abc import Collection, Mapping, Sequence
 from itertools import pairwise
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from calib.errors import BadInput
 from calib.plain_text import plain
+from calib.runs.cells import SMALLEST_SIGMA, channel_in, meant_in
 from calib.runs.header import Header, parse_header
 from calib.runs.record import Run
 from calib.runs.spelling import spelled
@@ -241,9 +241,9 @@ class _Table:
         """Read a column that must hold a finite number on every row."""
         values = np.empty(len(self.lines))
         for row, cell in enumerate(self._columns[name]):
-            value = _number(cell)
-            if value is None or not math.isfinite(value):
-                raise self.wrong(row, name, "a finite number")
+            value = meant_in(cell)
+            if value is None:
+                raise self.wrong(row, name, "a finite number that can be meant")
             values[row] = value
         return values
 
@@ -260,10 +260,10 @@ class _Table:
                             row, name, "an empty field, since no nest is named: a move only"
                         )
                     continue
-                value = _number(cell)
-                if value is None or not math.isfinite(value):
+                value = meant_in(cell)
+                if value is None:
                     raise self.wrong(row, name, f"a finite number in mm (nest {nest[row]})")
-                if name in SIGMAS and value <= 0:
+                if name in SIGMAS and value < SMALLEST_SIGMA:
                     raise self.wrong(row, name, "a standard uncertainty in mm, larger than zero")
                 values[index, row] = value
         return values
@@ -272,7 +272,7 @@ class _Table:
         channels: dict[str, Array] = {}
         left_aside: dict[str, str] = {}
         for name in names:
-            values = [math.nan if not cell else _number(cell) for cell in self._columns[name]]
+            values = [channel_in(cell) for cell in self._columns[name]]
             text = next((row for row, value in enumerate(values) if value is None), None)
             if text is not None and name in KNOWN_CHANNELS:
                 raise self.wrong(text, name, "a number, nan or an empty field")
@@ -280,21 +280,10 @@ class _Table:
                 left_aside[name] = f"line {self.lines[text]} holds {self._columns[name][text]!r}"
                 continue
             column = np.array(values, dtype=np.float64)
-            column[np.isinf(column)] = np.nan
             if name == "delay_s" and bool(np.any(column < 0)):
                 raise self.wrong(int(np.argmax(column < 0)), name, "a delay in s, not negative")
             channels[name] = column
         return channels, left_aside
-
-
-def _number(cell: str) -> float | None:
-    """Read a number as written by any program; None for text (and for Python's 1_000)."""
-    if "_" in cell:
-        return None
-    try:
-        return float(cell)
-    except ValueError:
-        return None
 
 
 def _is_cut(column: Cells) -> bool:
@@ -338,8 +327,8 @@ def _covariances(table: _Table, sigma: Array, measured: NDArray[np.bool_]) -> Ar
     for name in given:
         first, second = pairs[name]
         for row, cell in enumerate(table.cells(name)):
-            value = _number(cell) if cell else 0.0
-            if value is None or not math.isfinite(value):
+            value = meant_in(cell) if cell else 0.0
+            if value is None:
                 raise table.wrong(row, name, "a covariance in mm^2, or an empty field")
             covariance[first, second, row] = covariance[second, first, row] = value
     rows = np.flatnonzero(measured)

@@ -52,7 +52,7 @@ class SlcanBus(slcanBus):
             if len(self._buffer) > LONGEST_LINE:
                 self._drop()
             return None
-        if line.endswith("\a") or is_whole(line[:-1]):
+        if line == "\a" or (line.endswith("\r") and is_whole(line[:-1])):
             return line
         self._on_damaged(f"an slcan line {line[:40]!r}")
         return None

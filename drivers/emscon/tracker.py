@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 
+from drivers import plausible
 from drivers.emscon import wire
 from drivers.emscon.codes import (
     Angle,
@@ -38,6 +39,7 @@ from drivers.interface import (
 INITIALIZE_S = 90.0
 POINT_S = 60.0
 LONGEST_PACKET_GAP_S = 1.0
+AIR = {"air_temp_C": "temperature", "pressure_hPa": "pressure", "humidity": "humidity"}
 
 
 class EmsconTracker:
@@ -288,7 +290,7 @@ class EmsconTracker:
                             device=self._link.device,
                             remedy="Check the beam and lock on the reflector.",
                         ) from error
-                    for sample in samples(packet):
+                    for sample in samples(packet, self._link.device):
                         yield sample
             finally:
                 await self._abort()
@@ -297,14 +299,15 @@ class EmsconTracker:
     async def channels(self) -> dict[str, float]:
         """What it measures of object and air: deg C, hPa, relative humidity in %."""
         found = {}
+        device = self._link.device
         if self.can.object_temperature:
             thing = await self._ask("GetObjectTemperature")
-            found["structure_temp_C"] = thing.real("temperature")
+            temperature = thing.real("temperature")
+            found["structure_temp_C"] = plausible.weather("temperature", temperature, device)
         if self.can.weather:
             air = await self._ask("GetEnvironmentParams")
-            found["air_temp_C"] = air.real("temperature")
-            found["pressure_hPa"] = air.real("pressure")
-            found["humidity"] = air.real("humidity")
+            for name, field in AIR.items():
+                found[name] = plausible.weather(field, air.real(field), device)
         return found
 
     async def stop(self) -> None:

@@ -9,6 +9,7 @@ import math
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 
+from drivers import plausible
 from drivers.errors import BeamBroken, DeviceError, NoTarget, Refused
 from drivers.geocom.codes import LOST, NOT_YET, PRISMS, WHOLE, Rc, Rpc, in_words
 from drivers.geocom.link import Answer, GeoComLink
@@ -24,6 +25,8 @@ from drivers.interface import (
 MEASURE, CLEAR, AUTO = 1, 3, 1
 """Measurement programs (start, clear) and inclination by the instrument itself."""
 POLL_MS = 200
+TURN, NEAREST_M = 4.0 * math.pi, 0.01
+"""Angles (rad) and distances that can be, at most and at least."""
 """How long one question for a distance waits, ms of the instrument's time."""
 Vector = tuple[float, float, float]
 
@@ -163,7 +166,7 @@ class TotalStation:
             wait_s = 1e-3 * POLL_MS / self._scale
             answer = await self._link.request(Rpc.TMC_GET_SIMPLE_MEA, POLL_MS, AUTO, wait_s=wait_s)
             if answer.code in WHOLE:
-                return _point(*answer.numbers(3, self._link.device))
+                return _point(self._link.device, *answer.numbers(3, self._link.device))
             if answer.code in LOST or loop.time() > end:
                 self._locked = False
                 raise BeamBroken(
@@ -241,8 +244,13 @@ class TotalStation:
             callback(Alarm(self._link.device, error.what, error.remedy, fault=True))
 
 
-def _point(horizontal: float, vertical: float, distance_m: float) -> Vector:
-    """The prism (mm) by angles (rad) of either face and a slope distance."""
+def _point(device: str, horizontal: float, vertical: float, distance_m: float) -> Vector:
+    """The prism (mm) by angles (rad) of either face and a slope distance.
+
+    Raises ProtocolError for angles and distances that cannot be.
+    """
+    plausible.between((horizontal, vertical), -TURN, TURN, "angle", device)
+    plausible.between((distance_m,), NEAREST_M, 1e-3 * plausible.SURVEYED_MM, "distance", device)
     level = 1e3 * distance_m * math.sin(vertical)
     return (
         level * math.sin(horizontal),

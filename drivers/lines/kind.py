@@ -25,7 +25,7 @@ async def _open(around: Surroundings) -> Tracker:
         source = await TcpSource.open(settings["source"], device)
     elif settings["link"] == "serial":
         source = await SerialSource.open(
-            settings["source"], settings["baud"], settings["frame"], device
+            settings["source"], settings["baud"], settings["serial_frame"], device
         )
     else:
         source = await FileSource.open(settings["source"], device)
@@ -96,7 +96,11 @@ KIND: Kind[Tracker] = Kind(
         Setting("silence_s", "number", "seconds without a line that are a fault", 5.0, least=0.1),
         Setting("baud", "whole", "of a serial port", 9600, least=50, most=4_000_000),
         Setting(
-            "frame", "text", "of a serial port: bits, parity, stop bits", "8N1", choices=_FRAMES
+            "serial_frame",
+            "text",
+            "of a serial port: bits, parity, stop bits",
+            "8N1",
+            choices=_FRAMES,
         ),
     ),
     open=_open,

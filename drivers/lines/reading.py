@@ -4,10 +4,12 @@ import math
 import re
 from dataclasses import dataclass
 
+from drivers.plausible import SIGMA_MM, SURVEYED_MM
+
 UNITS = {"mm": 1.0, "um": 1e-3, "m": 1e3, "in": 25.4}
 """mm in one unit."""
-NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_BETWEEN = r"\s*[\s,;]\s*"
+NUMBER = r"[+-]?(?:\d{1,40}(?:\.\d{0,40})?|\.\d{1,40})(?:[eE][+-]?\d{1,4})?"
+_BETWEEN = r"(?:\s*[,;]\s*|\s+)"
 PLAIN = rf"\s*(?P<x>{NUMBER}){_BETWEEN}(?P<y>{NUMBER}){_BETWEEN}(?P<z>{NUMBER})\b.*"
 """Three numbers at the beginning, apart by blanks, commas or semicolons."""
 
@@ -65,9 +67,9 @@ class LinePattern:
             return None
         values = [self._number(found[name]) for name in "xyz"]
         sigma = [self._number(found[f"s{name}"]) for name in "xyz"] if self._own_sigma else None
-        if not all(map(math.isfinite, values)):
+        if not all(abs(value) <= SURVEYED_MM for value in values):
             return None
-        if sigma is not None and not all(0.0 < one < math.inf for one in sigma):
+        if sigma is not None and not all(SIGMA_MM[0] <= one <= SIGMA_MM[1] for one in sigma):
             return None
         x, y, z = values
         return Reading((x, y, z), None if sigma is None else (sigma[0], sigma[1], sigma[2]))

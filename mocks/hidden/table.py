@@ -28,8 +28,8 @@ class Hidden:
         for name in self.values:
             if _effect_of(name) is None:
                 raise ValueError(
-                    f'the mock knows no hidden effect "{name}"; '
-                    "names are those of the catalogue's parameters, or begin with unknown."
+                    f'the mock knows no hidden effect "{name[:80]}"; '
+                    "names are those of the catalogue's parameters, or begin with unknown"
                 )
 
     @classmethod
@@ -39,7 +39,10 @@ class Hidden:
         hidden = table.get("hidden", table)
         if not isinstance(hidden, Mapping):
             raise ValueError(f"{path}: hidden must be a table of names and numbers")
-        return cls(hidden)
+        try:
+            return cls(hidden)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from error
 
     @property
     def effects(self) -> tuple[HiddenEffect, ...]:

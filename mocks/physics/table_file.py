@@ -7,6 +7,7 @@ from typing import Any
 
 from calib.errors import BadInput
 from calib.plain_text import plain
+from calib.quantity import in_short, is_meant
 from calib.toml_place import joined_names, load_toml
 
 
@@ -28,12 +29,15 @@ def read_table(path: Path) -> Mapping[str, Any]:
 
 
 def numbers_by_name(table: Mapping[str, object], what: str) -> dict[str, float]:
-    """Numbers by their dotted names; raises ValueError for a value that is none.
+    """Numbers by their dotted names; raises ValueError for a value that is none that can be meant.
 
     ``leg1.L0 = 1.0`` without quotes is such a name too. ``what`` the numbers are, for messages.
     """
     found = joined_names(table)
     for name, value in found.items():
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ValueError(f'{what} "{name}" must be a number, got {value!r}')
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not (number and is_meant(value)):
+            raise ValueError(
+                f'{what} "{name[:80]}" must be a number that can be meant, got {in_short(value)}'
+            )
     return {name: float(value) for name, value in found.items()}

@@ -10,6 +10,8 @@ from calib.errors import BadInput
 from calib.toml_table import TomlTable
 from drivers.kind import Kind, Setting
 
+TRACKER_KEYS = {"kind", "serial", "model", "reflector", "frame", "frame_radius_mm"}
+
 
 async def _nothing(_: object) -> None:
     raise AssertionError
@@ -96,3 +98,5 @@ def test_every_kind_says_what_it_needs(role: str, name: str, kind: Kind) -> None
     assert all(setting.says for setting in kind.settings)
     if name != "operator":  # a person is here
         assert any(setting.required for setting in kind.settings)  # where the device is
+    taken = {"kind", "serial", "store"} if role == "controller" else TRACKER_KEYS
+    assert not taken & set(names), "the site file has another meaning for it"
