@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -10,9 +11,10 @@ from typing import Any, TypeVar
 
 import click
 
-from app.plain_data import plain
+from app.plain_data import plain, printable
 from app.written import writable
 
+_LATE_CONTROLS = re.compile(r"[\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
@@ -39,17 +41,22 @@ def show(data: Mapping[str, Any], as_json: bool, text: str) -> None:
     if as_json:
         print_json(data)
     else:
-        click.echo(text)
+        click.echo(printable(text))
 
 
 def print_json(data: Mapping[str, Any]) -> None:
     """Print one JSON object; numbers that are not finite become null, as JSON has no others."""
-    click.echo(json.dumps(plain(data), ensure_ascii=False))
+    # JSON writes out the other controls by itself.
+    click.echo(_LATE_CONTROLS.sub(_written_out, json.dumps(plain(data), ensure_ascii=False)))
 
 
 def say(text: str) -> None:
     """Tell the operator something that is not the answer."""
-    click.echo(text, err=True)
+    click.echo(printable(text), err=True)
+
+
+def _written_out(found: re.Match[str]) -> str:
+    return f"\\u{ord(found[0]):04x}"
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

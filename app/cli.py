@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from app.errors import GateRefused, StoppedByOperator
+from app.plain_data import printable
 from calib.errors import BadInput
 from drivers.errors import DeviceError
 
@@ -179,6 +180,6 @@ def run(arguments: list[str] | None = None) -> int:
 def _end(error: Exception, code: int) -> int:
     """Say why the program ends."""
     words = {2: "bad input", 3: "hardware fault", 4: "stopped", 5: "refused"}[code]
-    text = str(error)
+    text = printable(str(error))
     click.echo(f"pkmcal: {words}: {text}" if text else f"pkmcal: {words}", err=True)
     return code

@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn
 
 from app.answer import interactive
+from app.plain_data import printable
 from app.session import events as ev
 from app.session.kinds import KINDS
 from app.session.session import Outcome, Session
@@ -54,7 +55,7 @@ class ConsoleFace:
         match event:
             case ev.StepStarted(says=says, kind=kind):
                 self._often = KINDS[kind].often
-                self._progress.update(self._task, description=says)
+                self._progress.update(self._task, description=printable(says))
             case ev.Progress(done=done, total=total, remaining_s=remaining):
                 left = "" if remaining is None else f"{duration(remaining)} left"
                 self._progress.update(self._task, completed=done, total=total, left=left)
@@ -68,12 +69,12 @@ class ConsoleFace:
             case _:
                 words = _words(event, self._total)
                 if words:
-                    self._console.print(words, markup=False)
+                    self._console.print(printable(words), markup=False)
 
     async def _ask(self, prompt: ev.PromptNeeded) -> None:
         self._progress.stop()
         instead = f", or {prompt.typed}" if prompt.typed else ""
-        text = f"{prompt.text} ({'/'.join(prompt.choices)}{instead})"
+        text = f"{printable(prompt.text)} ({'/'.join(prompt.choices)}{instead})"
         choice = click.STRING if prompt.typed else click.Choice(prompt.choices)
 
         def ask() -> str:

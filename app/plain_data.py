@@ -1,8 +1,17 @@
 """Plain data: what JSON can say."""
 
 import math
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
+
+_CONTROLS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+"""Signs that move a terminal's cursor, colour it, or turn the order of what is read."""
+
+
+def printable(text: str) -> str:
+    """Text whose controls are written out: what a file or a device says commands no terminal."""
+    return _CONTROLS.sub(lambda found: f"\\x{ord(found[0]):02x}", text.replace("\r\n", "\n"))
 
 
 def plain(value: Any) -> Any:

@@ -29,6 +29,7 @@ truth               settled = false: answers true pose, parameters, frame (for j
 
 import asyncio
 import json
+import re
 import socket
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -42,6 +43,8 @@ from mocks.tracker.server import TrackerServer
 from mocks.world import World
 
 LONGEST_LINE = 1 << 20
+_HTTP = re.compile(rb"[A-Z]+ \S+ HTTP/|[A-Za-z-]+: ")
+"""The first line of a browser's request, or a line of its head."""
 SETTLED_AFTER_S = 20.0
 Arguments = Mapping[str, Any]
 
@@ -222,6 +225,8 @@ class ControlServer:
         self._writers.add(writer)
         try:
             while line := await reader.readline():
+                if _HTTP.match(line):
+                    return  # a browser: what a page sends is nobody's hands
                 writer.write(json.dumps(self._answer(line)).encode() + b"\n")
                 await writer.drain()
         except (OSError, ValueError):

@@ -8,6 +8,7 @@ it says ``"keep": false``.
 
 import asyncio
 import json
+import re
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
@@ -18,6 +19,7 @@ from app.plain_data import plain
 from calib.errors import BadInput
 
 HOST = "127.0.0.1"
+_HTTP = re.compile(rb"[A-Z]+ \S+ HTTP/|[A-Za-z-]+: ")
 LONGEST_LINE = 65536
 MOST_CLIENTS = 32
 LARGEST = 1e9
@@ -195,6 +197,8 @@ class CorrectionServer:
         while data := await reader.read(LONGEST_LINE):
             *lines, held = (held + data).split(b"\n")
             for line in lines:
+                if _HTTP.match(line):
+                    return  # a browser: a page is no program that asks
                 if overlong or len(line) > LONGEST_LINE:
                     overlong = False
                     await _send(writer, _refused(f"a line is longer than {LONGEST_LINE} bytes"))

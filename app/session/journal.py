@@ -15,31 +15,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from app.session.journal_file import checksum, opened
 from app.session.kinds import KINDS
 from app.session.plan import Plan
 from calib.errors import BadInput
-
-_SCHEMA = """
-CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
-CREATE TABLE IF NOT EXISTS steps (
-    id TEXT PRIMARY KEY, position INTEGER NOT NULL, kind TEXT NOT NULL);
-CREATE TABLE IF NOT EXISTS log (
-    seq INTEGER PRIMARY KEY AUTOINCREMENT, step TEXT NOT NULL REFERENCES steps (id),
-    state TEXT NOT NULL, attempt INTEGER NOT NULL, time_s REAL NOT NULL, utc TEXT NOT NULL,
-    result TEXT NOT NULL);
-CREATE TABLE IF NOT EXISTS rows (
-    seq INTEGER PRIMARY KEY AUTOINCREMENT, step TEXT NOT NULL, attempt INTEGER NOT NULL,
-    kind TEXT NOT NULL CHECK (kind IN ('move', 'reading')),
-    status TEXT NOT NULL DEFAULT 'good' CHECK (status IN ('good', 'rejected', 'invalidated')),
-    why TEXT NOT NULL DEFAULT '', time_s REAL NOT NULL, utc TEXT NOT NULL, pose TEXT NOT NULL,
-    nest TEXT NOT NULL, q TEXT NOT NULL, xyz TEXT, covariance TEXT, delay_s REAL, cycle INTEGER,
-    channels TEXT NOT NULL, raw TEXT NOT NULL);
-CREATE UNIQUE INDEX IF NOT EXISTS one_good_reading
-    ON rows (step) WHERE kind = 'reading' AND status = 'good';
-CREATE TABLE IF NOT EXISTS notes (
-    seq INTEGER PRIMARY KEY AUTOINCREMENT, time_s REAL NOT NULL, utc TEXT NOT NULL,
-    kind TEXT NOT NULL, text TEXT NOT NULL);
-"""
 
 PARAMETERS, SMRS, FRAME = "controller_parameters", "smrs", "controller_frame"
 IDENTITIES = "identities"
@@ -110,21 +89,8 @@ class NewRow:
 class Journal:
     """Opens, or creates, the journal of one session."""
 
-    def __init__(self, path: Path, *, read_only: bool = False) -> None:
-        if read_only and not path.is_file():
-            raise BadInput("no journal here", place=str(path), remedy="Name a session's folder")
-        target = f"{path.resolve().as_uri()}?mode=ro" if read_only else str(path)
-        self._db = sqlite3.connect(target, uri=read_only, isolation_level=None, timeout=5.0)
-        self._db.row_factory = sqlite3.Row
-        try:
-            if not read_only:
-                self._db.execute("PRAGMA journal_mode = WAL")
-                self._db.execute("PRAGMA synchronous = FULL")
-                self._db.executescript(_SCHEMA)
-            self._db.execute("SELECT count(*) FROM meta").fetchone()
-        except sqlite3.DatabaseError as error:
-            self._db.close()
-            raise BadInput(f"not a journal of this program ({error})", place=str(path)) from error
+    def __init__(self, path: Path, *, read_only: bool = False, checked: bool = True) -> None:
+        self._db = opened(path, read_only=read_only, checked=checked)
         self._states: dict[str, StepState] = {}
         self._seen = 0
 
@@ -148,8 +114,9 @@ class Journal:
     def set_meta(self, key: str, value: Any) -> None:
         """Remember a fact about the session."""
         self._db.execute(
-            "INSERT INTO meta VALUES (?, ?) ON CONFLICT (key) DO UPDATE SET value = excluded.value",
-            (key, json.dumps(value)),
+            "INSERT INTO meta (key, value, sum) VALUES (:key, :value, :sum) ON CONFLICT (key) "
+            "DO UPDATE SET value = excluded.value, sum = excluded.sum",
+            _summed("meta", {"key": key, "value": json.dumps(value)}),
         )
 
     def meta(self, key: str, default: Any = None) -> Any:
@@ -229,9 +196,16 @@ class Journal:
         self, step: str, state: str, attempt: int, time_s: float, utc: str, result: Any
     ) -> None:
         self._db.execute(
-            "INSERT INTO log (step, state, attempt, time_s, utc, result) VALUES (?, ?, ?, ?, ?, ?)",
-            (step, state, attempt, time_s, utc, json.dumps(result)),
-        )
+            "INSERT INTO log (step, state, attempt, time_s, utc, result, sum) "
+            "VALUES (:step, :state, :attempt, :time_s, :utc, :result, :sum)",
+            _summed(
+                "log",
+                {
+                    "step": step, "state": state, "attempt": attempt, "time_s": float(time_s),
+                    "utc": utc, "result": json.dumps(result),
+                },
+            ),
+        )  # fmt: skip
 
     def log(self) -> list[tuple[str, float, str, str, dict[str, Any]]]:
         """Every entry of the log: UTC, time in s, step, state, result."""
@@ -246,18 +220,20 @@ class Journal:
             return self._insert(step, attempt, utc, row)
 
     def _insert(self, step: str, attempt: int, utc: str, row: NewRow) -> int:
+        values = {
+            "step": step, "attempt": attempt, "kind": row.kind, "status": row.status,
+            "why": row.why, "time_s": float(row.time_s), "utc": utc, "pose": row.pose,
+            "nest": row.nest, "q": json.dumps(row.q),
+            "xyz": None if row.xyz is None else json.dumps(row.xyz),
+            "covariance": None if row.covariance is None else json.dumps(row.covariance),
+            "delay_s": None if row.delay_s is None else float(row.delay_s), "cycle": row.cycle,
+            "channels": json.dumps(row.channels or {}), "raw": json.dumps(row.raw or {}),
+        }  # fmt: skip
+        names = [*values, "sum"]
         cursor = self._db.execute(
-            "INSERT INTO rows (step, attempt, kind, status, why, time_s, utc, pose, nest, q, xyz, "
-            "covariance, delay_s, cycle, channels, raw) "
-            "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-            (
-                step, attempt, row.kind, row.status, row.why, row.time_s, utc, row.pose, row.nest,
-                json.dumps(row.q),
-                None if row.xyz is None else json.dumps(row.xyz),
-                None if row.covariance is None else json.dumps(row.covariance),
-                row.delay_s, row.cycle, json.dumps(row.channels or {}), json.dumps(row.raw or {}),
-            ),
-        )  # fmt: skip
+            f"INSERT INTO rows ({', '.join(names)}) VALUES (:{', :'.join(names)})",
+            _summed("rows", values),
+        )
         return cursor.lastrowid or 0
 
     def rows(self, *, good_only: bool = True) -> list[Row]:
@@ -328,6 +304,10 @@ class Journal:
         """UTC, time in s, kind and text of every note."""
         rows = self._db.execute("SELECT utc, time_s, kind, text FROM notes ORDER BY seq")
         return [(row["utc"], row["time_s"], row["kind"], row["text"]) for row in rows]
+
+
+def _summed(table: str, values: dict[str, Any]) -> dict[str, Any]:
+    return {**values, "sum": checksum(table, values)}
 
 
 def _row(row: sqlite3.Row) -> Row:

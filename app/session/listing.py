@@ -1,6 +1,7 @@
 """The sessions on the disk: what each was, how far it came, and what happened in it."""
 
 import json
+import sqlite3
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,7 +39,7 @@ def facts_of(folder: Path) -> SessionFacts:
     """Read what a session is; one whose files cannot be read is ``broken``."""
     try:
         plan = json.loads(read_text(folder / PLAN))
-        journal = Journal(folder / JOURNAL, read_only=True)
+        journal = Journal(folder / JOURNAL, read_only=True, checked=False)
     except (BadInput, ValueError) as error:
         return SessionFacts(folder, "broken", "", "", "", str(error), "", "", 0, 0, 0, 0)
     try:
@@ -58,6 +59,8 @@ def facts_of(folder: Path) -> SessionFacts:
             done=sum(state.state in ("done", "skipped") for state in states.values()),
             steps=len(plan.get("steps", ())),
         )
+    except (sqlite3.DatabaseError, ValueError) as error:
+        return SessionFacts(folder, "broken", "", "", "", str(error), "", "", 0, 0, 0, 0)
     finally:
         journal.close()
 

@@ -43,7 +43,8 @@ class Station:
         self.observers = observers or Observers()
         self.clock = Clock(site.clock_scale)
         self.carrier: Carrier = carrier_of(site)
-        self.owner = Ownership(_machine_key(site))
+        self.owner = Ownership(f"{site.machine.name} at {site.controller.address}")
+        self._owner_by_serial: Ownership | None = None
         self._devices: Devices | None = None
         self._alarm_hooks: list[Callable[[Alarm], None]] = []
 
@@ -82,8 +83,10 @@ class Station:
         self.owner.take()
         controller: MotionController | None = None
         try:
+            self._own_by_serial(self.site.controller.serial)
             controller = await open_controller(self.site)
             self._check_identity("controller", controller.identity, self.site.controller.serial)
+            self._own_by_serial(controller.identity.serial)
             tracker = await open_tracker(self.site)
             try:
                 self._check_identity("tracker", tracker.identity, self.site.tracker.serial)
@@ -93,7 +96,7 @@ class Station:
         except BaseException:
             if controller is not None:
                 await controller.close()
-            self.owner.release()
+            self._disown()
             raise
         self._devices = Devices(controller, tracker)
         controller.on_alarm(self._alarm)
@@ -187,9 +190,23 @@ class Station:
             ):
                 await close()
                 self.observers.tell(Disconnected(role))
+        self._disown()
+
+    def _own_by_serial(self, serial: str) -> None:
+        """Own the machine by what it is, too: its serial number is the same at every address.
+
+        Mocks all have the same; what they are is the station that moves them. Raises GateRefused.
+        """
+        hands = self.site.hands
+        if self._owner_by_serial is not None or not serial:
+            return
+        where = f"mock {hands.host}:{hands.port}" if hands.kind == "mock" else f"serial {serial}"
+        owner = Ownership(f"{self.site.machine.name} with {where}")
+        owner.take()
+        self._owner_by_serial = owner
+
+    def _disown(self) -> None:
         self.owner.release()
-
-
-def _machine_key(site: Site) -> str:
-    """What names the machine for the lock: its controller's address."""
-    return f"{site.machine.name} at {site.controller.address}"
+        if self._owner_by_serial is not None:
+            self._owner_by_serial.release()
+            self._owner_by_serial = None

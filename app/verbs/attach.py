@@ -10,7 +10,8 @@ import click
 from app import answer
 
 if TYPE_CHECKING:
-    from app.session.listing import Following, Happening
+    from app.plain_data import printable
+from app.session.listing import Following, Happening
 
 POLL_S = 0.5
 SILENT_S = 30.0
@@ -62,7 +63,7 @@ def _watch(followed: "Following") -> None:
         while True:
             for one in news:
                 if one.kind != "started":
-                    console.print(_line(one), markup=False)
+                    console.print(printable(_line(one)), markup=False)
             facts = followed.facts
             doing = next((one.text for one in reversed(news) if one.kind == "started"), None)
             bar.update(task, completed=facts.done, total=facts.steps)

@@ -6,6 +6,7 @@ from typing import Any
 import click
 
 from app import answer
+from app.plain_data import printable
 from calib.errors import BadInput
 from drivers.kind import Kind, Setting, Takes
 
@@ -58,11 +59,12 @@ def check(site_file: Path) -> None:
     from app.files.site import load_site
 
     site = load_site(site_file)
-    click.echo(
+    said = (
         f"{site_file}: {site.machine.name}; controller {site.controller.kind} at "
         f"{site.controller.address}; tracker {site.tracker.kind} at {site.tracker.address}; "
         f"{len(site.platform_nests)} nests on the platform, {len(site.base_nests)} on the base"
     )
+    click.echo(printable(said))
 
 
 def _data(role: str, name: str, kind: Kind[Any]) -> dict[str, Any]:
