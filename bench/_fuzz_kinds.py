@@ -38,7 +38,7 @@ class Kind:
 
 
 CORRECT = ("correct", "model.toml", "--poses", "wanted.csv", "--extrapolate", "--json")
-QUALITY = r"RAW:nan|^(chi2|rms|noise|holdout|platform|left_out|readings)"
+QUALITY = r"RAW:nan|^nominal|^(chi2|rms|noise|holdout|platform|left_out|readings)"
 """What a model file says for people, and that a number is not known."""
 KINDS = (
     Kind("run.toml", "run/run.toml", ("fit", "run", "--json")),

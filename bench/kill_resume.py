@@ -21,6 +21,7 @@ from app.files.runs import read_run
 from app.session.folder import read_folder
 from app.session.journal import Journal
 from app.session.within import JOURNAL
+from bench._reliability_page import Row, write_row
 
 POSES = {
     "a": (5.0, 0.0, 222.0, 0.05, 0.0, 0.1),
@@ -98,7 +99,10 @@ def main() -> None:
     parser.add_argument("--kills", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scale", type=float, default=300.0)
+    parser.add_argument("--seconds", type=float, default=300.0)
+    parser.add_argument("--page", action="store_true")
     options = parser.parse_args()
+    until = time.monotonic() + options.seconds
     dice = random.Random(options.seed)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -118,7 +122,7 @@ def main() -> None:
         begin = ["measure", "--site", "site.toml", "--poses", "poses.csv", "--unattended"]
         begun, kills, sessions = time.monotonic(), 0, 0
         try:
-            while kills < options.kills:
+            while kills < options.kills and time.monotonic() < until:
                 kills += one_session(folder, begin, dice, options.kills - kills)
                 sessions += 1
         finally:
@@ -126,10 +130,11 @@ def main() -> None:
             station.wait(timeout=20)
             station.stdout.close()
     spent = time.monotonic() - begun
-    print(
-        f"{kills} kills in {sessions} sessions, {spent:.0f} s, seed {options.seed}: "
-        "nothing lost, nothing counted twice"
-    )
+    ran, says = f"{kills} kills in {sessions} sessions", "nothing lost, nothing counted twice"
+    print(f"{ran}, {spent:.0f} s, seed {options.seed}: {says}")
+    if options.page:
+        command = f"kill_resume --kills {options.kills} --seed {options.seed}"
+        write_row("kills", Row(command, f"{ran} of measure and resume", says))
 
 
 if __name__ == "__main__":

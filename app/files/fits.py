@@ -164,7 +164,6 @@ def _without_nulls(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def _estimate(entry: TomlTable) -> Estimate:
     value = entry.optional_number("value", finite=False)
     sigma = entry.optional_number("sigma", finite=False)
-    entry.optional_number("nominal", finite=False)
     return Estimate(
         Unknown(entry.text("name"), entry.text("unit", "")),
         math.nan if value is None else value,

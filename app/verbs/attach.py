@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import click
 
 from app import answer
+from app.plain_data import printable
 
 if TYPE_CHECKING:
-    from app.plain_data import printable
-from app.session.listing import Following, Happening
+    from app.session.listing import Following, Happening
 
 POLL_S = 0.5
 SILENT_S = 30.0
