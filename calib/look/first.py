@@ -17,7 +17,7 @@ from calib.look.labels import any_labels, mirrored_table, other_labels
 from calib.look.load import load_and_payload
 from calib.look.misfit import look_at_misfit, seat_refined
 from calib.look.moved import moved_station, parts_of
-from calib.look.places import Places, places_of
+from calib.look.places import Places, places_of, points_of_one, roughly_known
 from calib.look.point_units import point_units
 from calib.look.pose_labels import pose_labels
 from calib.look.proposal import Proposal
@@ -34,12 +34,15 @@ from calib.runs.record import Run
 from calib.runs.remark import Remark
 from calib.runs.stack import Rows, stack
 
+_Look = Callable[[Run], tuple[Run, list[Remark]]]
 _Hypothesis = Callable[[Places], Proposal | None]
 HYPOTHESES: tuple[_Hypothesis, ...] = (
     other_labels, moved_station, mirrored_table, displaced_seat, any_labels, turned_table,
     slid_rows, held_actuator,
 )  # fmt: skip
 """What may explain readings that stand in no nest; the first that explains all is taken."""
+OF_COLUMNS: tuple[_Look, ...] = (clock, temperatures, load_and_payload)
+"""What can be asked of readings of any kind."""
 OF_TABLES = tuple(one for one in HYPOTHESES if one is not moved_station)
 """What may make a machine seem off as a whole; a moved station is no other than such a machine."""
 NEARLY = 0.9
@@ -69,10 +72,12 @@ def first_look(machine: Machine, runs: Sequence[Run]) -> Rows:
     known: _Known = {}
     for run in runs:
         check_travel(machine, run)
-        if run.sensing is not None:
-            looked.append(run)  # hypotheses about where SMRs stand need points of one tracker
+        points = points_of_one(run)
+        run, of_rows = rows_alone(machine, run) if points else _each(run, OF_COLUMNS)
+        if not points or roughly_known(run):  # nothing to say of where SMRs stand
+            remarks += of_rows
+            looked.append(run)
             continue
-        run, of_rows = rows_alone(machine, run)
         check_lengths(machine, run)
         parts, of_places, shown = _places(machine, run)
         if shown and len(runs) > 1:
@@ -117,19 +122,21 @@ def rows_alone(machine: Machine, run: Run) -> tuple[Run, list[Remark]]:
     looked, remarks = no_measurements(run)
     if not looked.measured.any():
         return run, remarks  # the fit says that there is nothing
-    for look in (clock, point_units, rounding):
-        looked, found = look(looked)
-        remarks += found
-    looked, found = temperatures(looked)
-    remarks += found
-    looked, found = load_and_payload(looked)
-    remarks += found
-    looked, found = sigmas(looked)
+    looked, found = _each(looked, (*OF_COLUMNS, point_units, rounding, sigmas))
     remarks += found
     for ask in (slid_commands, pose_labels):
         looked, found = ask(machine, looked)
         remarks += found
     return looked, remarks
+
+
+def _each(run: Run, looks: Sequence[_Look]) -> tuple[Run, list[Remark]]:
+    """The run as several looks at it leave it, one after the other."""
+    remarks: list[Remark] = []
+    for look in looks:
+        run, found = look(run)
+        remarks += found
+    return run, remarks
 
 
 def _places(machine: Machine, run: Run) -> tuple[list[Run], list[Remark], _Known]:

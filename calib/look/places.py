@@ -20,11 +20,14 @@ from calib.mechanism.description import Machine
 from calib.mechanism.rigid import rotate
 from calib.model.prediction import Model
 from calib.runs.record import Run
+from calib.runs.sensing import POINT
 from calib.runs.stack import Rows, stack
 
 FEW = 4
 """Wrong readings up to so many, or this part of a run, are matters of single readings."""
 PART = 0.03
+ROUGH_MM = 0.3
+"""Standard deviation of a nest's place beyond which nothing is said of where its readings stand."""
 Frame = tuple[Array, Array]
 """Rotation (3, 3) and position (3,) of the base in the tracker frame."""
 
@@ -111,6 +114,28 @@ class Places:
         base = rotation.T @ (self.seen - position[:, None])
         own = np.einsum("jin,jn->in", self.rotation, base - self.position)
         return np.where(self.rows.on_platform, own, base)
+
+
+def points_of_one(run: Run) -> bool:
+    """Whether all readings are whole points of one tracker in a frame of its own."""
+    own = run.sensing
+    if own is None:
+        return True
+    read = run.measured
+    setup = run.header.setup
+    names = {own.instrument[row] for row in np.flatnonzero(read)}
+    if len(names) != 1 or setup is None:
+        return False
+    used = setup.of(names.pop())
+    steady = used.frame == "free" and used.zero_sigma is None and used.scale_sigma is None
+    return steady and bool(np.all(own.kind[read] == POINT) and np.all(own.seen[:, read]))
+
+
+def roughly_known(run: Run) -> bool:
+    """Whether some nest may be so far from where the table says that no reading can be placed."""
+    setup = run.header.setup
+    nests = {} if setup is None else setup.nests
+    return any(np.linalg.eigvalsh(one)[-1] > ROUGH_MM**2 for one in nests.values())
 
 
 def places_of(machine: Machine, run: Run) -> Places | None:

@@ -17,6 +17,7 @@ from calib.look.first import rows_alone
 from calib.look.judged import record_of, settled
 from calib.runs.record import Run
 from calib.runs.remark import lines_in_words, ranges
+from calib.runs.sensing import POINT, Instrument, Sensing, Setup
 from calib.runs.stack import Rows
 
 MACHINES = ("hexapod", "tripod", "ptm")
@@ -268,6 +269,43 @@ def test_many_excluded_readings_are_never_silent():
     record = record_of(fit_effects(rows, []))
     assert [one.name for one in record] == ["many-excluded"]
     assert not settled(record)
+
+
+def version_2(run: Run, nests: dict[str, np.ndarray]) -> Run:
+    """The run as version 2 writes it: points of a tracker, some nests with a prior."""
+    count = run.line.size
+    sensing = Sensing(
+        kind=np.where(run.measured, POINT, -1),
+        instrument=("tracker",) * count,
+        second=("",) * count,
+        plane=("",) * count,
+        ends=np.full((2, count), -1),
+        seen=np.tile(run.measured, (3, 1)),
+        axis=np.zeros((3, count)),
+        attitude=np.repeat(np.eye(3)[:, :, None], count, axis=2),
+        spread=np.zeros((6, 6, count)),
+    )
+    setup = Setup({"tracker": Instrument()}, {}, nests)
+    return replace(run, sensing=sensing, header=replace(run.header, setup=setup))
+
+
+@pytest.mark.parametrize(
+    "name", ["zeros at the start", "readings no longer change", "nests exchanged", "sigmas in um"]
+)
+def test_points_of_version_2_are_looked_at_like_those_of_version_1(name):
+    run = version_2(made("hexapod", "pose-by-pose"), {"b1": 1e-4 * np.eye(3)})
+    rows = looked("hexapod", spoiled(MISTAKES[name], name, run))
+    assert {one.name for one in rows.remarks} & set(MISTAKES[name].says)
+    assert len(rows.remarks) == 1
+    assert fit_effects(rows, []).chi2_per_dof < 1.6
+
+
+def test_readings_in_nests_that_are_roughly_known_are_not_placed():
+    run = made("hexapod", "pose-by-pose")
+    first = next(iter(run.header.platform_nests))
+    table = {**run.header.platform_nests, first: run.header.platform_nests[first] + 15.0}
+    run = replace(run, header=replace(run.header, platform_nests=table))
+    assert looked("hexapod", version_2(run, {first: 400.0 * np.eye(3)})).remarks == ()
 
 
 def test_lines_are_told_in_ranges():
