@@ -61,11 +61,12 @@ def plain(text: str, encoding: str | None) -> str:
     try:
         text.encode(encoding or "utf-8")
     except UnicodeEncodeError:
-        return "".join(_shade(character) for character in text)
+        return "".join(shade(character) for character in text)
     return text
 
 
-def _shade(character: str) -> str:
+def shade(character: str) -> str:
+    """A sign of ASCII as dark as one of dots; any other as it is."""
     dots = ord(character) - 0x2800
     return _SHADES[dots.bit_count()] if 0 <= dots <= 0xFF else character
 

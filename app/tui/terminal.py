@@ -7,12 +7,15 @@ meanwhile goes with the next one (:mod:`app.tui.painting`).
 """
 
 import io
+import os
 import sys
 import time
 from collections.abc import Callable
 from typing import IO, Any, cast
 
 from textual.drivers.linux_driver import LinuxDriver
+
+from app.tui.signs import in_ascii, only_ascii
 
 LEAVE_S = 2.0
 """How long the end of the program waits for a terminal that takes nothing."""
@@ -32,6 +35,7 @@ class PatientDriver(LinuxDriver):
         self._file = cast("Any", self._taken)  # the writer's thread asks for no more of a file
         self._sent = 0
         self._held: list[str] = []
+        self._ascii = only_ascii(os.environ)
         self.on_taken: Callable[[], None] | None = None
         """Called in the writer's thread when the terminal has taken everything; nothing is held
         back before it is set."""
@@ -50,6 +54,7 @@ class PatientDriver(LinuxDriver):
         self._send(data)
 
     def _send(self, data: str) -> None:
+        data = in_ascii(data) if self._ascii else data
         self._sent += len(data)
         super().write(data)
 
