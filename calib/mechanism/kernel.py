@@ -37,6 +37,11 @@ def available() -> bool:
     return _built
 
 
+def processor() -> str:
+    """Which compilation of the core runs here; empty without the core."""
+    return _core.processor() if _built else ""
+
+
 def use(compiled: bool) -> None:
     """Whether the core may be used from now on; without it, it makes no difference."""
     global _wanted
@@ -121,7 +126,7 @@ class Kernel:
         out = np.empty((15 + self.joints + self.actuators + strains, count))
         begin: tuple[Array | None, ...]
         if isinstance(start, Configuration):
-            series, begin = None, self._place(start)
+            series, begin = None, self.place(start)
         else:
             series, begin = start, (None,)
         _core.solve(
@@ -162,7 +167,7 @@ class Kernel:
         by_parameter = np.empty((self.parameters, 6, at.count))
         by_actuator = np.empty((self.actuators, 6, at.count))
         _core.differentiate(
-            self.machine, at.count, _real(parameters), *self._place(at), by_parameter, by_actuator
+            self.machine, at.count, _real(parameters), *self.place(at), by_parameter, by_actuator
         )
         return by_parameter, by_actuator
 
@@ -172,17 +177,18 @@ class Kernel:
         """Twists (len(places), 6, N) per unit of single elements, (limb, element)."""
         pairs = np.array(places, dtype=np.intc).reshape(-1, 2)
         out = np.zeros((len(pairs), 6, at.count))
-        _core.lock(self.machine, at.count, _real(parameters), *self._place(at), pairs, out)
+        _core.lock(self.machine, at.count, _real(parameters), *self.place(at), pairs, out)
         return out
 
     def rows(self, parameters: Numbers, at: Configuration) -> tuple[Array, Array]:
         """Rows A (m, 6, N) and gaps b (m, N) of the closure, limb after limb."""
         out = np.empty(7 * self.row_count * at.count)
-        _core.rows(self.machine, at.count, _real(parameters), *self._place(at), out)
+        _core.rows(self.machine, at.count, _real(parameters), *self.place(at), out)
         split = 6 * self.row_count * at.count
         return out[:split].reshape(-1, 6, at.count), out[split:].reshape(-1, at.count)
 
-    def _place(self, at: Configuration) -> tuple[Array, Array, Array, Array, Array]:
+    def place(self, at: Configuration) -> tuple[Array, Array, Array, Array, Array]:
+        """Position, rotation, passive, extension and strain as the core takes them."""
         strain = [_real(s).reshape(-1) for s in at.strain if s.size]
         return (
             _real(at.poses.position),

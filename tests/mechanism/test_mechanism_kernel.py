@@ -198,6 +198,11 @@ def test_no_poses_are_no_poses(hexapod: Machine) -> None:
     assert pose_jacobians(hexapod, found).parameters.shape == (54, 6, 0)
 
 
+def test_no_elements_have_no_twists(hexapod: Machine) -> None:
+    closed = forward(hexapod, np.zeros((6, 5)))
+    assert element_twists(hexapod, closed, None, []).shape == (0, 6, 5)
+
+
 def test_a_platform_that_nothing_holds_is_refused_in_the_same_words(hexapod: Machine) -> None:
     loose = replace(hexapod, limbs=hexapod.limbs[:5])
     with pytest.raises(BadInput, match="constrain 5 of 6 freedoms"):

@@ -160,16 +160,19 @@ INLINE vec task_row(const Machine *m, int k, const Target *to, const State *at, 
     return st * s - R[5];
 }
 
-/* Pose and extension steps that close the limbs and remove the task error together. */
-static void towards_target(const Machine *m, Work *w, const State *at, const Target *to) {
+/* Pose and extension steps that close the limbs and remove the task error together; with the
+   answers of the last linearisation where none is made anew. */
+static void towards_target(const Machine *m, Work *w, const State *at, const Target *to, int anew) {
     vec T[6], left[3], columns[3][3];
     if (m->full) {
         for (int j = 0; j < 3; j++)
             for (int i = 0; i < 3; i++) columns[j][i] = at->rotation[3 * i + j];
         small_rotation(columns, to->goal, left);
     }
-    actuator_answers(m, w, at);
-    for (int a = 0; a < m->actuators; a++) platform_twist(m, w, w->answer + a * m->rows);
+    if (anew) {
+        actuator_answers(m, w, at);
+        for (int a = 0; a < m->actuators; a++) platform_twist(m, w, w->answer + a * m->rows);
+    }
     for (int k = 0; k < m->tasks; k++) {
         vec error;
         if (m->full) {
@@ -180,10 +183,10 @@ static void towards_target(const Machine *m, Work *w, const State *at, const Tar
         }
         for (int i = 0; i < 3; i++) T[i] *= m->size;
         w->error[k] = error - dot(T, w->dx, 6);
-        for (int a = 0; a < m->actuators; a++)
+        for (int a = 0; anew && a < m->actuators; a++)
             w->task_answer[a * m->tasks + k] = dot(T, w->answer + a * m->rows, 6);
     }
-    factorise(&w->inner, m->tasks, m->actuators);
+    if (anew) factorise(&w->inner, m->tasks, m->actuators);
     apply_transposed(&w->inner, w->error, m->tasks, m->actuators);
     solve_triangle(&w->inner, w->error, m->tasks, m->actuators);
     for (int a = 0; a < m->actuators; a++) {

@@ -225,14 +225,14 @@ static void solve_at(const Job *job, Room *r, long first, int n) {
 
 static void differentiate_at(const Job *job, Room *r, long first, int n) {
     const Machine *m = job->machine;
-    const int own = job->places ? job->places : m->parameters;
+    const int own = job->place ? job->places : m->parameters;
     place(job, &job->start, &r->at, first, n);
-    if (job->places)
+    if (job->place)
         lock(m, &r->work, &r->at, r->inverse, r->unit, r->screw, job->place, own, r->out);
     else
         differentiate(m, &r->work, &r->at, r->inverse, r->unit, r->screw, r->out);
     for (long k = 0; k < 6 * own; k++) store(job->out + k * job->count + first, r->out[k], n);
-    for (long k = 0; !job->places && k < 6 * m->actuators; k++)
+    for (long k = 0; !job->place && k < 6 * m->actuators; k++)
         store(job->out_actuators + k * job->count + first, r->out[6 * own + k], n);
 }
 

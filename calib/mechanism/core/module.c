@@ -24,6 +24,8 @@ static void release(Held *held) {
     while (held->count) PyBuffer_Release(&held->view[--held->count]);
 }
 
+static double nothing[1];
+
 static const void *items(Held *held, PyObject *from, char kind, int writable, Py_ssize_t *count) {
     Py_buffer *view = &held->view[held->count];
     const int flags = PyBUF_C_CONTIGUOUS | PyBUF_FORMAT | (writable ? PyBUF_WRITABLE : 0);
@@ -34,7 +36,7 @@ static const void *items(Held *held, PyObject *from, char kind, int writable, Py
         return NULL;
     }
     *count = view->len / view->itemsize;
-    return view->buf;
+    return view->buf ? view->buf : nothing; /* an empty array may have no address */
 }
 
 /* The numbers of an array, of which there must be so many. */

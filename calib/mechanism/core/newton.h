@@ -62,7 +62,7 @@ static void step(const Machine *m, Work *w, State *at, const Target *to, int ane
     platform_twist(m, w, w->gap);
     for (int i = 0; i < 6; i++) w->dx[i] = -w->gap[i];
     if (to) {
-        towards_target(m, w, at, to);
+        towards_target(m, w, at, to, anew);
         for (int a = 0; a < m->actuators; a++) measure(&size, w->ds[a], m->per_actuator_unit[a]);
     }
     for (int i = 0; i < 6; i++) measure(&size, w->dx[i], 1.0);
@@ -97,7 +97,7 @@ static Progress solve_block(const Machine *m, Work *w, State *at, const Target *
     for (int k = 0; k < MAX_ITERATIONS && ANY(p.going); k++) {
         const vec before = p.previous;
         step(m, w, at, to, anew, &p);
-        anew = m->redundant || to || !all_near(&p, before);
+        anew = m->redundant || !all_near(&p, before);
     }
     return p;
 }
