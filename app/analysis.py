@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from app.files.models import chosen_effects, offered_effects
-from app.files.runs import read_runs
+from app.files.runs import LoadedRun, read_runs
 from calib.discover.discovery import Refitter
 from calib.effects import Effect, catalogue, effect_named
 from calib.errors import BadInput
@@ -23,8 +23,12 @@ def load_rows(
     place.
     """
     loaded = read_runs(runs)
+    return looked_at(loaded, chosen_effects(loaded[0].machine, add, model))
+
+
+def looked_at(loaded: Sequence[LoadedRun], effects: Sequence[Effect]) -> tuple[Rows, list[Effect]]:
+    """The readings as they are meant; with effects those that the record itself shows."""
     machine = loaded[0].machine
-    effects = chosen_effects(machine, add, model)
     rows = first_look(machine, [one.run for one in loaded])
     asked = {effect.id for effect in effects}
     shown = [effect_named(name, machine) for name in rows.known if name not in asked]

@@ -23,7 +23,7 @@ TASKS = (
         ("machine", "kinematics", "poses", "design", "sensitivity", "identifiability"),
     ),
     ("Measure", ("site", "measure", "resume", "attach", "enter", "import")),
-    ("Identify", ("fit", "compare", "predict")),
+    ("Identify", ("fit", "compare", "predict", "fleet")),
     ("Find what the model misses", ("diagnose", "discover")),
     (
         "Correct and prove it",

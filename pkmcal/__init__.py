@@ -50,6 +50,8 @@ if TYPE_CHECKING:
     from app.jobs.exporting import export as export
     from app.jobs.fitting import FitReport as FitReport
     from app.jobs.fitting import fit as fit
+    from app.jobs.fleet import FleetReport as FleetReport
+    from app.jobs.fleet import fit_fleet as fit_fleet
     from app.jobs.following_up import FollowUpReport as FollowUpReport
     from app.jobs.following_up import design as design
     from app.jobs.guessing import GuessReport as GuessReport
@@ -93,6 +95,7 @@ _HOMES = {
     "DiagnosisReport": "app.jobs.discovering",
     "DiscoveryReport": "app.jobs.discovering",
     "FitReport": "app.jobs.fitting",
+    "FleetReport": "app.jobs.fleet",
     "FollowUpReport": "app.jobs.following_up",
     "GateRefused": "app.errors",
     "GridReport": "app.jobs.posing",
@@ -120,6 +123,7 @@ _HOMES = {
     "discover": "app.jobs.discovering",
     "export": "app.jobs.exporting",
     "fit": "app.jobs.fitting",
+    "fit_fleet": "app.jobs.fleet",
     "guess_map": "app.jobs.guessing",
     "history_of": "app.jobs.looking_back",
     "import_run": "app.jobs.importing",
@@ -148,6 +152,7 @@ __all__ = [
     "DiagnosisReport",
     "DiscoveryReport",
     "FitReport",
+    "FleetReport",
     "FollowUpReport",
     "GateRefused",
     "GridReport",
@@ -176,6 +181,7 @@ __all__ = [
     "discover",
     "export",
     "fit",
+    "fit_fleet",
     "guess_map",
     "history_of",
     "import_run",

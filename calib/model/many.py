@@ -131,7 +131,7 @@ class Many:
         return np.tile(columns[..., self.kept], count)
 
 
-def drawn_readings(model: Model, state: State, seeds: list[tuple[int, ...]]) -> tuple[Array, Array]:
+def drawn_readings(model: Model, state: State, draws: list[tuple[int, ...]]) -> tuple[Array, Array]:
     """Machines drawn from the priors, and what is read of them with the rows' own noise.
 
     Parameters
@@ -140,7 +140,7 @@ def drawn_readings(model: Model, state: State, seeds: list[tuple[int, ...]]) -> 
         Of the geometry alone.
     state : State
         Its frames are those of every set.
-    seeds : list of D seeds
+    draws : list of D seeds
         A set is drawn by its own seed: the same whatever the others are.
 
     Returns
@@ -153,9 +153,9 @@ def drawn_readings(model: Model, state: State, seeds: list[tuple[int, ...]]) -> 
         Where a machine within the tolerances does not close at a pose.
     """
     many, rows, machine = Many(model), model.rows, model.machine
-    places = Places.around(model.start(state.frame_rotation, state.frame_position), len(seeds))
-    noise = np.empty((3, rows.count, len(seeds)))
-    for draw, seed in enumerate(seeds):
+    places = Places.around(model.start(state.frame_rotation, state.frame_position), len(draws))
+    noise = np.empty((3, rows.count, len(draws)))
+    for draw, seed in enumerate(draws):
         generator = np.random.default_rng(seed)
         off = generator.standard_normal(machine.nominal.size)
         places.parameters[:, draw] += machine.prior_sigma * off
@@ -166,7 +166,7 @@ def drawn_readings(model: Model, state: State, seeds: list[tuple[int, ...]]) -> 
             f"a {machine.name} within its tolerances does not close at a pose of the run",
             remedy="Choose poses farther from the ends of what it reaches, or smaller tolerances",
         )
-    position = np.repeat(rows.position[:, :, None], len(seeds), axis=2)
+    position = np.repeat(rows.position[:, :, None], len(draws), axis=2)
     position[:, many.kept] = many.seen(places, closed) + noise[:, many.kept]
     return places.parameters, position
 

@@ -44,6 +44,7 @@ ASKED: dict[str, tuple[str, ...] | None] = {
     ),
     "fit": ("fit", RUN, "--add", "backlash"),
     "compare": ("compare", RUN),
+    "fleet fit": ("fleet", "fit", RUN, f"{RUNS}/backlash-leg-3", "--workers", "1"),
     "predict": ("predict", "{}/model.toml", RUN, "--frame"),
     "diagnose": ("diagnose", RUN),
     "discover": ("discover", RUN),

@@ -24,6 +24,7 @@ SIGNATURES = {
     "diagnose": "runs, *, add=(), model=None, offer=(), mask=(), watch=None",
     "discover": "runs, *, add=(), model=None, offer=(), mask=(), watch=None",
     "export": "model, form, *, machine=None",
+    "fit_fleet": ("folders, *, add=(), out=None, workers=None, scheduler='', watch=None"),
     "fit": "runs, *, add=(), model=None, mask=()",
     "guess_map": "files, out, *, machine=None",
     "history_of": "folder='sessions', *, serial='', tolerance_um=None",
@@ -75,6 +76,7 @@ FIELDS = {
     "holdout_floor_um platform_rms_um platform_floor_um by_kind parameters unidentified "
     "unidentified_words bad_readings left_out_readings channels_left_aside settled steps remarks "
     "record",
+    "FleetReport": "machine effects parameters machines outliers remarks",
     "FollowUpReport": "machine discriminate model runs conditions right_now right_then poses "
     "advice",
     "GridReport": "machine workspace_scale box poses",
