@@ -19,6 +19,8 @@ FEWEST_FIRST, MOST_FIRST = 6, 60
 """Poses that an autopilot may begin with."""
 REFERENCE_EVERY = 40
 """Poses of a verification between two looks at the base nests."""
+UNITS = {"mm": 1.0, "um": 1e-3, "in": 25.4}
+"""Units in which numbers are typed, in mm."""
 TEMPLATES = ("csv", "gcode-delta", "hal", "p-variables")
 """Forms of an export that are templates."""
 PLAIN = ("json", "toml", "urdf")

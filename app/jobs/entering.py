@@ -9,6 +9,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from app.defaults import UNITS
 from app.files.machines import load_machine
 from app.files.runs import HEADER
 from app.files.typed_run import TOOL, TypedRun, begin
@@ -21,7 +22,6 @@ from calib.mechanism.rigid import rotate
 from calib.poses.reach import PoseSet, solve_poses
 
 What = Literal["height", "gauge", "calipers"]
-UNITS = {"mm": 1.0, "um": 1e-3, "in": 25.4}
 """mm in one unit."""
 LATER, BACK, STOP = "", "b", "s"
 """Answers that are no number: leave it for later, take the last one back, stop."""

@@ -5,13 +5,16 @@ For machines and instruments without a link. See docs/no-laser-tracker.md.
 
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from app import answer
-from app.jobs.entering import UNITS, What, enter
+from app.defaults import UNITS
 from calib.errors import BadInput
+
+if TYPE_CHECKING:
+    from app.jobs.entering import What
 
 
 @click.command()
@@ -41,7 +44,7 @@ from calib.errors import BadInput
 def command(
     run: Path,
     poses: Path,
-    what: What,
+    what: "What",
     machine: str | None,
     sigma_um: float,
     unit: str,
@@ -60,6 +63,8 @@ def command(
     decimal point, inches, the number before once more. A gauge shows heights from a zero of its
     own; calipers measure between marks that the tool has left at poses (--pair A:B).
     """
+    from app.jobs.entering import enter
+
     for name, value in (("--sigma-um", sigma_um), ("--near", near)):
         if not 0.0 < value < float("inf"):
             raise BadInput(f"{value:g} is not larger than zero", place=name)
