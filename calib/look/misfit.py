@@ -16,6 +16,7 @@ from calib.errors import BadInput
 from calib.identify.fitting import Fit
 from calib.identify.staged import fit_effects
 from calib.look.bent import not_stated, rounded_commands, slip, slip_remark, table_frame
+from calib.look.gravity import gravity_elsewhere
 from calib.look.scan import excess, prior_cost, scan, with_the_excluded
 from calib.look.seats import ALONG, lifted, normal_of, seated
 from calib.look.several import beyond_one_step, stepped_fit
@@ -83,7 +84,8 @@ def look_at_misfit(
         return [stated.run], [stated.remark], {}
     bent = prior_cost(fitted) > BENT * fitted.model.free.size
     if fitted.chi2_per_dof < LOUD and not bent:
-        return [run], [], {}
+        elsewhere = gravity_elsewhere(fitted)
+        return [run], [] if elsewhere is None else [elsewhere], {}
     if known:
         more = beyond_one_step(machine, run, fitted) if alone else None
         return ([run], [], {}) if more is None else (more[0], [more[1]], {})

@@ -19,6 +19,7 @@ from calib.runs.record import Run
 from calib.runs.remark import lines_in_words, ranges
 from calib.runs.sensing import POINT, Instrument, Sensing, Setup
 from calib.runs.stack import Rows
+from mocks.simulate.plan import Profile
 
 MACHINES = ("hexapod", "tripod", "ptm")
 ORDERS = ("nest-by-nest", "pose-by-pose")
@@ -224,6 +225,18 @@ def test_runs_of_two_machines_are_said_to_be_such():
     rows = first_look(machine_named("hexapod"), [run, other])
     assert [one.name for one in rows.remarks] == ["several-machines"]
     assert not settled(rows.remarks)
+
+
+@pytest.mark.parametrize(
+    ("turn", "expected"), [([0, 2, 1], ["gravity-direction"]), ([0, 1, 2], [])]
+)
+def test_gravity_in_another_direction_than_the_weight_is_said(turn, expected):
+    heavy = Profile(rise_K=0.0, payload_kg=(0.0, 12.0))
+    run = clean_run("hexapod", 7, poses=20, hidden={"gravity-sag.c": 3e-4}, profile=heavy)
+    load = replace(run.header.load, gravity=run.header.load.gravity[turn])
+    rows = looked("hexapod", replace(run, header=replace(run.header, load=load)))
+    assert [one.name for one in rows.remarks] == expected
+    assert settled(rows.remarks) == (not expected)
 
 
 def test_what_was_set_aside_stays_on_the_way_of_the_machine():
