@@ -11,6 +11,7 @@ from calib.effects.component import Effect
 from calib.identify.fitting import Fit
 from calib.identify.readings import MASKED, BadReading
 from calib.identify.starting import MOVED
+from calib.look.carried import as_fitted
 from calib.look.places import PART
 from calib.look.strays import groups
 from calib.runs.remark import Remark, lines_in_words, ranges
@@ -34,7 +35,7 @@ def record_of(fitted: Fit) -> tuple[Remark, ...]:
     """What is said first of a fit: of the record, of the readings left out, of sizes and signs."""
     together = groups(fitted)
     return (
-        *fitted.model.rows.remarks,
+        *(as_fitted(remark, fitted) for remark in fitted.model.rows.remarks),
         *(group.remark for group in together),
         *_left_out(fitted, {row for group in together for row in group.rows}),
         *_geometry(fitted),

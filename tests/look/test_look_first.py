@@ -15,6 +15,7 @@ from calib.identify.staged import fit_effects
 from calib.look import first_look
 from calib.look.first import rows_alone
 from calib.look.judged import record_of, settled
+from calib.mechanism.rigid import exponential
 from calib.runs.record import Run
 from calib.runs.remark import lines_in_words, ranges
 from calib.runs.sensing import POINT, Instrument, Sensing, Setup
@@ -191,6 +192,18 @@ def test_the_moment_and_the_size_of_a_move_are_found():
     assert np.linalg.norm(fitted.values[at : at + 3]) == pytest.approx(40.0, abs=0.05)
     moment = fitted.values[at + 6]
     assert run.time_s[read[-10]] <= moment <= run.time_s[read[-9]] + 5.0
+
+
+def test_how_far_the_tracker_itself_was_carried_is_told():
+    run = made("hexapod", "pose-by-pose")
+    read = np.flatnonzero(run.measured)
+    turn = exponential(np.array([0.0, 0.0, 0.02]))
+    position = run.position.copy()
+    position[:, read[40:]] = turn @ position[:, read[40:]] + np.array([[30.0], [0.0], [0.0]])
+    rows = looked("hexapod", replace(run, position=position))
+    shift = effect_named("frame-shift", rows.machine)
+    (remark,) = record_of(fit_effects(rows, [shift]))
+    assert remark.says.endswith("If it was the tracker, it went 30 mm and turned by 20 mrad")
 
 
 def test_a_station_that_moved_twice_has_three_frames():
