@@ -174,6 +174,14 @@ def run(arguments: list[str] | None = None) -> int:
         if wrong.filename is None:
             raise
         return _end(BadInput(wrong.strerror or str(wrong), place=str(wrong.filename)), 2)
+    except MemoryError as wrong:
+        return _end(
+            BadInput(
+                f"this computer has too little memory for it ({wrong or 'no size is said'})",
+                remedy="Ask for less at once: fewer poses, readings or candidates",
+            ),
+            EXIT_BAD_INPUT,
+        )
     return code if isinstance(code, int) else 0
 
 

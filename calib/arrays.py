@@ -1,5 +1,6 @@
 """The array types of the mathematics."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -15,3 +16,10 @@ Numbers = npt.NDArray[Any]
 
 Selection = slice | BoolArray | IntArray
 """What picks some of the poses."""
+
+
+def parts_of(which: BoolArray, each: int = 2000) -> Iterator[IntArray]:
+    """Indices of what is chosen, a part at a time: what is made of them is never there at once."""
+    chosen = np.flatnonzero(which)
+    for first in range(0, chosen.size, each):
+        yield chosen[first : first + each]

@@ -15,7 +15,7 @@ from calib.evidence.problem import LinearProblem
 
 HELD = 4_000_000
 """Numbers of noise that are held (32 MB)."""
-BLOCK = 8_000_000
+BLOCK = 4_000_000
 """Numbers in a block of draws, unless a hundred draws have more."""
 LEAST = 100
 """Draws in a block at least: so the number of blocks does not grow with the readings."""
@@ -102,7 +102,8 @@ class Residuals:
                 which = slice(at + first, at + last)
                 found = noise.some(first, last)
                 for rows, pulls in self._taken:
-                    found = found - rows.T @ pulls[:, which]
+                    off = rows.T @ pulls[:, which]
+                    found = np.subtract(found, off, out=off)
                 if before.size:
                     which, found = slice(0, which.stop), np.concatenate([before, found], axis=1)
                     before = before[:, :0]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from calib.arrays import Array, BoolArray
+from calib.arrays import Array, BoolArray, parts_of
 from calib.identify.fitting import Fit
 from calib.runs.sensed import kind_words
 
@@ -76,11 +76,10 @@ def _of_kind(fit: Fit, name: str, which: BoolArray, *, angular: bool) -> OfKind:
     rows, linear = fit.model.rows, fit.linear
     live = rows.live[:, which]
     told = live if angular else rows.in_millimetres[:, which]
-    jacobian, root = linear.jacobian[:, :, which], rows.unwhitener[:, :, which]
-    natural = np.einsum("ijn,pjn->pin", root, jacobian)
+    root = rows.unwhitener[:, :, which]
     noise = np.einsum("ijn,ijn->in", root, root) * fit.noise.scale**2
-    expected = noise - _variance(fit, natural)
-    leverage = _variance(fit, jacobian)
+    expected = noise - _variance(fit, which, rows.unwhitener)
+    leverage = _variance(fit, which)
     perfect = float(np.sum((fit.noise.scale**2 - leverage)[live]))
     squares = float(np.sum(linear.whitened[:, which] ** 2))
     return OfKind(
@@ -94,12 +93,17 @@ def _of_kind(fit: Fit, name: str, which: BoolArray, *, angular: bool) -> OfKind:
     )
 
 
-def _variance(fit: Fit, columns: Array) -> Array:
-    """Variance (3, M) of the prediction, from its derivatives (p, 3, M)."""
-    flat = columns.reshape(columns.shape[0], -1)
-    return np.asarray(np.sum(flat * (fit.step_covariance @ flat), axis=0)).reshape(
-        columns.shape[1:]
-    )
+def _variance(fit: Fit, which: BoolArray, root: Array | None = None) -> Array:
+    """Variance (3, M) of the prediction, in sigmas or through ``root`` (3, 3, N)."""
+    found = [np.zeros((3, 0))]
+    for part in parts_of(which):
+        columns = fit.linear.jacobian[:, :, part]
+        if root is not None:
+            columns = np.einsum("ijn,pjn->pin", root[:, :, part], columns)
+        flat = columns.reshape(columns.shape[0], -1)
+        variance = np.sum(flat * (fit.step_covariance @ flat), axis=0)
+        found.append(variance.reshape(columns.shape[1:]))
+    return np.concatenate(found, axis=1)
 
 
 def _root_mean(squares: Array, told: BoolArray) -> float:

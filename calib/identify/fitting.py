@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from calib.arrays import Array, BoolArray
+from calib.arrays import Array, BoolArray, parts_of
 from calib.evidence.problem import LinearProblem
 from calib.identify.optimum import optimise
 from calib.identify.readings import MASKED, BadReading, strays
@@ -180,9 +180,12 @@ class Fit:
 
     def explained(self, covariance: Array, which: BoolArray) -> float:
         """Sum of tr(J C J^T) in mm^2 over readings: variance of the prediction itself."""
-        jacobian = self.model.rows.in_mm(self.linear.jacobian[:, :, which], which)
-        flat = jacobian.reshape(jacobian.shape[0], -1)
-        return float(np.sum(flat * (covariance @ flat)))
+        total = 0.0
+        for part in parts_of(which):
+            jacobian = self.model.rows.in_mm(self.linear.jacobian[:, :, part], part)
+            flat = jacobian.reshape(jacobian.shape[0], -1)
+            total += float(np.sum(flat * (covariance @ flat)))
+        return total
 
 
 def noise_variance(fit: Fit, which: BoolArray) -> float:

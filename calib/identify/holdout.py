@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.arrays import Array, BoolArray
+from calib.arrays import Array, BoolArray, parts_of
 from calib.identify.fitting import Fit, noise_variance
 from calib.noise import Whitening
 from calib.scaled import Scaled, normal_matrix
@@ -70,8 +70,9 @@ def hold_out_of(
         off = whitened[:, held] - np.tensordot(inverse @ slope, own, axes=1)
         squares += float(np.sum(rows.in_mm(off, held) ** 2))
         floor += noise_variance(fit, told)
-        natural = rows.in_mm(own, held).reshape(own.shape[0], -1)
-        floor += float(np.sum(natural * (inverse @ natural)))
+        for part in parts_of(held):
+            natural = rows.in_mm(jacobian[:, :, part], part).reshape(own.shape[0], -1)
+            floor += float(np.sum(natural * (inverse @ natural)))
         count += int(told.sum())
     if count == 0:
         return HoldOut(float("nan"), float("nan"), 0)
@@ -86,9 +87,11 @@ def _independent(
     fit: Fit, whitened: Array, jacobian: Array, precision: Array, pull: Array, accepted: BoolArray
 ) -> Teach:
     """Readings that share no noise: the held-out ones' part is taken off the normal equations."""
-    chosen = jacobian[:, :, accepted].reshape(jacobian.shape[0], -1)
-    normal = normal_matrix(chosen, precision)
-    slope = chosen @ whitened[:, accepted].reshape(-1) - pull
+    normal, slope = np.diag(precision), -pull
+    for part in parts_of(accepted):
+        chosen = jacobian[:, :, part].reshape(jacobian.shape[0], -1)
+        normal = normal + chosen @ chosen.T
+        slope = slope + chosen @ whitened[:, part].reshape(-1)
 
     def teach(held: BoolArray) -> tuple[Array, Array]:
         block = jacobian[:, :, held].reshape(jacobian.shape[0], -1)

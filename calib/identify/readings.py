@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.arrays import Array, BoolArray, IntArray
+from calib.arrays import Array, BoolArray, IntArray, parts_of
 from calib.chance import f_rarer_than
 from calib.runs.stack import Rows
-from calib.scaled import Scaled, normal_matrix
+from calib.scaled import Scaled
 
 FALSE_ALARM = 1e-3
 """Probability that a run without a stray has a reading flagged."""
@@ -84,9 +84,11 @@ def strays(
     accepted = candidates.copy()
     if components is None:
         components = np.full(accepted.size, 3, dtype=np.intp)
-    flat = np.where(accepted, jacobian, 0.0)
-    normal = normal_matrix(flat.reshape(flat.shape[0], -1), prior_precision)
-    step = np.zeros(flat.shape[0])
+    normal = np.diag(prior_precision)
+    for part in parts_of(accepted):
+        block = jacobian[:, :, part].reshape(jacobian.shape[0], -1)
+        normal = normal + block @ block.T
+    step = np.zeros(jacobian.shape[0])
     found: list[int] = []
     while len(found) < MOST_STRAYS * candidates.sum():
         index, moved = _worst(whitened, jacobian, normal, step, accepted, components)
@@ -111,9 +113,11 @@ def _worst(
     """Most suspicious reading, or None; and the step of the fit once it is left out."""
     inverse = Scaled.of(normal).inverse()
     count = accepted.size
-    flat = jacobian.reshape(jacobian.shape[0], -1)
-    spread = (inverse @ flat).reshape(jacobian.shape)
-    hat = np.einsum("pin,pjn->nij", jacobian, spread)
+    hat = np.empty((count, 3, 3))
+    for part in parts_of(np.ones(count, dtype=bool)):
+        block = jacobian[:, :, part]
+        spread = (inverse @ block.reshape(block.shape[0], -1)).reshape(block.shape)
+        hat[part] = np.einsum("pin,pjn->nij", block, spread)
     residual = (whitened - np.tensordot(step, jacobian, axes=1)).T
     freed = np.linalg.solve(np.eye(3) - hat, residual[:, :, None])[:, :, 0]
     drop = np.where(accepted, np.sum(residual * freed, axis=1), 0.0)
@@ -127,7 +131,7 @@ def _worst(
     ratio = drop[worst] / size / others
     if not f_rarer_than(FALSE_ALARM / count, size, max(dof - size, 1.0), ratio):
         return None, step
-    return worst, step - spread[:, :, worst] @ freed[worst]
+    return worst, step - inverse @ jacobian[:, :, worst] @ freed[worst]
 
 
 def _log_chance(drop: Array, own: IntArray, total: float, dof: float) -> Array:

@@ -62,6 +62,12 @@ def test_bad_usage_and_bad_input_end_with_2(
     assert "no plan.json" in capsys.readouterr().err
 
 
+def test_what_does_not_fit_into_the_memory_is_said_in_words(tmp_path, capsys):
+    words = ["poses", "hexapod", "--n", "5", "--out", str(tmp_path / "p.toml")]
+    assert run([*words, "--candidates", "2000000000000000"]) == 2
+    assert "too little memory" in capsys.readouterr().err
+
+
 def test_a_mistyped_verb_is_answered_with_the_one_meant(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
