@@ -6,8 +6,8 @@ from importlib.metadata import version
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
+from app.report.figures import new_figure
 from app.report.page import Facts, Items, Page, Picture, Section, Table, Text
 from calib.digits import Digits
 
@@ -117,8 +117,7 @@ def parameter_row(one: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _quality(good: list[Mapping[str, Any]]) -> Picture:
     """RMS over what a perfect model would leave, machine by machine."""
-    figure = Figure(figsize=(7.0, 2.4), layout="constrained")
-    axes = figure.add_subplot()
+    figure, (axes,) = new_figure(7.0, 2.4)
     ratio = [(one["rms_um"] or np.nan) / (one["noise_floor_um"] or np.nan) for one in good]
     colours = [RED if one["outlier"] else BLUE for one in good]
     axes.scatter(range(1, len(good) + 1), ratio, c=colours, s=14)
@@ -130,8 +129,7 @@ def _quality(good: list[Mapping[str, Any]]) -> Picture:
 
 def _usual(report: Mapping[str, Any]) -> Picture:
     """Every machine's parameters, from nominal, in tolerances."""
-    figure = Figure(figsize=(7.0, 2.8), layout="constrained")
-    axes = figure.add_subplot()
+    figure, (axes,) = new_figure(7.0, 2.8)
     nominal, tolerance, mean, spread = (
         np.array([one[key] for one in report["parameters"]])
         for key in ("nominal", "tolerance", "mean", "spread")
@@ -144,6 +142,6 @@ def _usual(report: Mapping[str, Any]) -> Picture:
     axes.errorbar(at, (mean - nominal) / tolerance, spread / tolerance, fmt="_", color=BLUE, lw=1.2)
     axes.axhline(0.0, color="#777777", lw=0.8)
     axes.set_xlabel("parameter, in the order of the table")
-    axes.set_ylabel("from nominal, tolerances")
+    axes.set_ylabel("from nominal, in tolerances")
     says = "Machines with the fleet's priors (points); usual value and spread (bars)."
     return Picture.of(figure, says)
