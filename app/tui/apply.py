@@ -23,6 +23,14 @@ from app.writeback.proposal import Change
 from calib.digits import Digits, fixed
 
 
+class LatestInSight(VerticalScroll):
+    """Shows its end also when something else, a banner, has taken room from it."""
+
+    def on_resize(self) -> None:
+        """Go to the end."""
+        self.call_after_refresh(self.scroll_end, animate=False)
+
+
 class ApplyFace(Face):
     """Writing corrections to the controller, with the way back always open."""
 
@@ -54,7 +62,7 @@ class ApplyFace(Face):
             with Vertical(id="apply-right"):
                 with VerticalScroll(id="apply-gates", classes="panel"):
                     yield Static(id="apply-gates-text")
-                with VerticalScroll(id="apply-stages", classes="panel"):
+                with LatestInSight(id="apply-stages", classes="panel"):
                     yield Static(id="apply-stages-text")
                 yield Static(id="apply-sets", classes="panel")
 

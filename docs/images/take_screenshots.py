@@ -34,9 +34,13 @@ class Photographer:
 
     async def until(self, true: Callable[[], bool]) -> None:
         """Wait for a condition, at most three minutes."""
-        async with asyncio.timeout(180.0):
-            while not true():  # noqa: ASYNC110 - a condition of many parts, none an event
-                await asyncio.sleep(0.05)
+        try:
+            async with asyncio.timeout(180.0):
+                while not true():  # noqa: ASYNC110 - a condition of many parts, none an event
+                    await asyncio.sleep(0.05)
+        except TimeoutError:
+            log = [line.text for line in self.bench.desk.picture.log]
+            raise SystemExit("\n".join(["not within three minutes:", *log[-12:]])) from None
         await self.pilot.pause(0.4)
 
     async def keys(self, *keys: str) -> None:

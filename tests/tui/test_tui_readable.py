@@ -10,7 +10,7 @@ from rich.text import Text
 from textual.app import App, ComposeResult
 from textual.widgets import DataTable
 
-from app.session.events import GateChecked
+from app.session.events import GateChecked, WriteBackStage
 from app.tui.apply import gates_text, grouped, rows_of
 from app.tui.discover import largest_text
 from app.tui.program import Workbench
@@ -119,3 +119,19 @@ async def test_upright_axes_and_long_cells_tell_the_truth() -> None:
         fill(table, ("name", "size"), [("x" * 60, Text("3e-17", "bold"))], most=20)
         assert str(table.get_row_at(0)[0]) == "x" * 19 + "…"
         assert str(table.get_row_at(0)[1]).strip() == "3e-17"
+
+
+@pytest.mark.long
+async def test_the_latest_stage_of_a_write_back_is_in_sight(tmp_path: Path) -> None:
+    bench = Workbench(root=tmp_path)
+    async with bench.run_test(size=(80, 24)) as pilot:
+        await pilot.press("5")
+        for number in range(12):
+            bench.desk.picture.tell(
+                WriteBackStage("write", f"stage {number} of a way that takes more than a line")
+            )
+            await pilot.pause(0.1)
+        bench.desk.picture.say_trouble("a fault", "what to do about it")
+        await pilot.pause(0.5)
+        stages = bench.screen.query_one("#apply-stages")
+        assert stages.scroll_offset.y == stages.max_scroll_y > 0
