@@ -49,6 +49,8 @@ NEARLY = 0.9
 """Part of the readings that one of these must then explain by the tolerances alone."""
 ONCE_MORE = {"station-moved", "smr-size", "range-step"}
 """What a fit says in place of the one step of the frame that the nominal machine showed."""
+NOWHERE = 0.5
+"""Part of the readings that stand in their nests, below which commands may be another row's."""
 MOST_ROUNDS = 4
 """Hypotheses about places that may hold at once."""
 _Known = Mapping[str, Array]
@@ -80,6 +82,8 @@ def first_look(machine: Machine, runs: Sequence[Run]) -> Rows:
             continue
         check_lengths(machine, run)
         parts, of_places, shown = _places(machine, run)
+        if any(one.name == "rows-shifted" for one in of_places):  # labels were right, q was not
+            of_rows = [one for one in of_rows if one.name != "pose-label-shared"]
         if shown and len(runs) > 1:
             parts = _parted(machine, run)
             shown = {}
@@ -148,6 +152,10 @@ def _places(machine: Machine, run: Run) -> tuple[list[Run], list[Remark], _Known
             check_conventions(machine, run, None)
             break
         check_columns(places)
+        if not remarks and places.strict.standing < NOWHERE * places.rows.count:
+            run, remarks = slid_commands(machine, run, nowhere=True)
+            if remarks:
+                continue
         best = _despite_slack(places)
         if best is None:
             if places.rows.count - places.standing < places.limit:

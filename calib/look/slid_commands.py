@@ -21,16 +21,20 @@ ENOUGH = 0.9
 """Part of the readings that must stand in their nests once q is put back."""
 
 
-def slid_commands(machine: Machine, run: Run) -> tuple[Run, list[Remark]]:
-    """Put q back by one row where many labels stand for two poses, and for one each then."""
+def slid_commands(machine: Machine, run: Run, *, nowhere: bool = False) -> tuple[Run, list[Remark]]:
+    """Put q back by one row where many labels stand for two poses, and for one each then.
+
+    ``nowhere``: the readings stand in no nest; q is tried though labels show nothing, as when each
+    nest was read at all poses in turn.
+    """
     shared = shared_labels(machine, run)
-    if len(shared) <= MANY:
+    if len(shared) <= MANY and not nowhere:
         return run, []
     best: tuple[int, Run, IntArray, int] | None = None
     for by in (1, -1):
         for rows in _columns(run):
             put = _put_back(run, rows, by)
-            if len(shared_labels(machine, put)) > len(shared) // 4:
+            if len(shared_labels(machine, put)) > max(MANY, len(shared) // 4):
                 continue
             count = _in_nests(machine, put)
             if best is None or count > best[0]:
@@ -46,8 +50,8 @@ def slid_commands(machine: Machine, run: Run) -> tuple[Run, list[Remark]]:
             f"q1.. stand one row too {late}: they are those of the row "
             f"{'before' if by > 0 else 'after'}",
             ranges(run.line[changed], run.line[rows]),
-            f"{len(shared)} labels stand for two commands as it is written; with q put back, "
-            f"{best[0]} of {run.readings} readings stand in their nests",
+            f"With q put back {best[0]} of {run.readings} readings stand in their nests; "
+            f"{len(shared)} labels stand for two commands as it is written",
             "Fitted with q put back by one row",
             "Write in each row what was commanded when it was read",
             True,

@@ -124,10 +124,11 @@ def test_a_mistake_is_named_and_mended(name, machine, order):
     assert fitted.chi2_per_dof < 1.6
 
 
+@pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("machine", MACHINES)
-def test_commands_a_row_late_are_put_back(machine):
+def test_commands_a_row_late_are_put_back(machine, order):
     name = "q one row late"
-    rows = looked(machine, spoiled(MISTAKES[name], name, made(machine, "pose-by-pose")))
+    rows = looked(machine, spoiled(MISTAKES[name], name, made(machine, order)))
     assert [one.name for one in rows.remarks] == ["rows-shifted"]
     assert "q1.. stand one row too late" in rows.remarks[0].says
     fitted = fit_effects(rows, [])
