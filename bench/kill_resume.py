@@ -14,6 +14,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 
 from app.files.pose_table import poses_text
@@ -43,6 +45,15 @@ def held(folder: Path) -> list[tuple[str, float]]:
     journal = Journal(folder / JOURNAL, read_only=True)
     try:
         return [(row.step, row.time_s) for row in journal.rows() if row.kind == "reading"]
+    finally:
+        journal.close()
+
+
+def steps_of(folder: Path, steps: Iterable[str]) -> list[object]:
+    """What the log says of some steps."""
+    journal = Journal(folder / JOURNAL, read_only=True)
+    try:
+        return [entry[2:] for entry in journal.log() if entry[2] in set(steps)]
     finally:
         journal.close()
 
@@ -87,7 +98,9 @@ def one_session(folder: Path, begin: list[str], dice: random.Random, kills_left:
     _, plan = read_folder(session)
     wanted = [step.id for step in plan.steps if step.kind in ("read", "reference")]
     if sorted(step for step, _ in before) != sorted(wanted):
-        raise SystemExit(f"NOT ONCE EACH: {session}")
+        found = Counter(step for step, _ in before)
+        lacking = {step: found[step] for step in {*wanted, *found} if found[step] != 1}
+        raise SystemExit(f"NOT ONCE EACH: {session}: {lacking}; {steps_of(session, lacking)}")
     if sum(bool(nest) for nest in read_run(session / "run").run.nest) != len(wanted):
         raise SystemExit(f"THE RUN MISSES READINGS: {session}")
     return kills

@@ -5,6 +5,7 @@ from importlib.resources import files
 from pathlib import Path
 
 import jinja2
+from jinja2.sandbox import SandboxedEnvironment
 
 from app.files.text import read_text
 from app.report.logo import logo_of
@@ -15,7 +16,7 @@ TEMPLATE = "record.html"
 
 
 def html_of(page: Page, template: str = "") -> str:
-    """Set a record by a Jinja template, the shipped one if none is named.
+    """Set a record by a Jinja template in a sandbox, the shipped one if none is named.
 
     Raises
     ------
@@ -24,7 +25,7 @@ def html_of(page: Page, template: str = "") -> str:
     """
     data, pictures = page.to_data()
     source = read_text(Path(template)) if template else shipped(TEMPLATE)
-    environment = jinja2.Environment(
+    environment = SandboxedEnvironment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     addresses = {name: _address("image/svg+xml", svg.encode()) for name, svg in pictures.items()}
@@ -32,7 +33,7 @@ def html_of(page: Page, template: str = "") -> str:
     address = _address(logo.media_type, logo.content) if logo else ""
     try:
         return environment.from_string(source).render(record=data, pictures=addresses, logo=address)
-    except jinja2.TemplateError as error:
+    except (jinja2.TemplateError, ArithmeticError, LookupError, TypeError, ValueError) as error:
         line = getattr(error, "lineno", None)
         place = f"{template or TEMPLATE}{f', line {line}' if line else ''}"
         raise BadInput(

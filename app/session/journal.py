@@ -6,6 +6,7 @@ once or not at all. Rows are never deleted: a reading that is set aside keeps it
 reason.
 """
 
+import errno
 import json
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
@@ -91,6 +92,7 @@ class Journal:
 
     def __init__(self, path: Path, *, read_only: bool = False, checked: bool = True) -> None:
         self._db = opened(path, read_only=read_only, checked=checked)
+        self._path, self._file = path, path.stat().st_ino
         self._states: dict[str, StepState] = {}
         self._seen = 0
 
@@ -98,8 +100,19 @@ class Journal:
         """Close the database."""
         self._db.close()
 
+    def _require_file(self) -> None:
+        """Raise OSError if the file is no longer where it was: what is written would be lost."""
+        try:
+            there = self._path.stat().st_ino == self._file
+        except FileNotFoundError:
+            there = False
+        if not there:
+            what = "the journal was removed or replaced while it was written"
+            raise FileNotFoundError(errno.ENOENT, what, str(self._path))
+
     @contextmanager
     def _transaction(self) -> Iterator[None]:
+        self._require_file()
         self._db.execute("BEGIN IMMEDIATE")
         try:
             yield
@@ -156,6 +169,14 @@ class Journal:
             )
         return MappingProxyType(self._states)
 
+    def ended(self) -> int:
+        """Count the steps that are done or skipped, without reading the whole log."""
+        row = self._db.execute(
+            "SELECT count(*) AS n FROM (SELECT state, max(seq) FROM log GROUP BY step) "
+            "WHERE state IN ('done', 'skipped')"
+        ).fetchone()
+        return int(row["n"])
+
     def state(self, step: str) -> StepState:
         """State of one step."""
         return self.states().get(step, PLANNED)
@@ -195,6 +216,7 @@ class Journal:
     def _log(
         self, step: str, state: str, attempt: int, time_s: float, utc: str, result: Any
     ) -> None:
+        self._require_file()
         self._db.execute(
             "INSERT INTO log (step, state, attempt, time_s, utc, result, sum) "
             "VALUES (:step, :state, :attempt, :time_s, :utc, :result, :sum)",

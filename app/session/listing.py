@@ -44,7 +44,6 @@ def facts_of(folder: Path) -> SessionFacts:
         return SessionFacts(folder, "broken", "", "", "", str(error), "", "", 0, 0, 0, 0)
     try:
         finished = str(journal.meta("finished_utc", ""))
-        states = journal.states()
         return SessionFacts(
             folder=folder,
             state="finished" if finished else "begun",
@@ -56,7 +55,7 @@ def facts_of(folder: Path) -> SessionFacts:
             finished_utc=finished,
             poses=len(plan.get("poses", {})),
             readings=journal.readings(),
-            done=sum(state.state in ("done", "skipped") for state in states.values()),
+            done=journal.ended(),
             steps=len(plan.get("steps", ())),
         )
     except (sqlite3.DatabaseError, ValueError) as error:

@@ -119,6 +119,21 @@ def test_a_fault_in_a_template_is_named(tmp_path: Path) -> None:
         assert name in fault.value.place
 
 
+@pytest.mark.parametrize(
+    "evil",
+    [
+        "{{ ''.__class__.__mro__[1].__subclasses__() }}",
+        "{{ cycler.__init__.__globals__.os.getcwd() }}",
+        "{% for k in range(10000000) %}{% endfor %}",
+    ],
+)
+def test_a_template_of_somebody_else_s_runs_nothing(tmp_path: Path, evil: str) -> None:
+    template = tmp_path / "evil.html"
+    template.write_text(evil)
+    with pytest.raises(BadInput, match=r"evil\.html"):
+        html_of(PAGE, str(template))
+
+
 def test_a_pose_passes_only_with_its_uncertainty_within_the_tolerance() -> None:
     def judged(error_um: float) -> tuple[bool, bool]:
         checked = Checked(answer(error_um, expanded_um=2.0), POSES, Taken())

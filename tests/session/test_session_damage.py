@@ -110,6 +110,23 @@ def test_without_its_wal_an_older_state_is_gone_on_with(tmp_path: Path) -> None:
     assert said(Path(copy)) == before
 
 
+@pytest.mark.parametrize("replaced", [False, True])
+def test_a_folder_that_is_removed_meanwhile_takes_nothing_more(
+    tmp_path: Path, replaced: bool
+) -> None:
+    """On Linux the file would go on without a name, and everything with it."""
+    path = filled(tmp_path)
+    journal = Journal(path)
+    path.rename(tmp_path / "elsewhere")
+    if replaced:
+        path.write_bytes(b"")
+    with pytest.raises(OSError, match="removed or replaced"):
+        journal.started(STEPS[0].id, 2, 99.0, "now")
+    with pytest.raises(OSError, match="removed or replaced"):
+        journal.done(STEPS[0].id, 2, 99.0, "now", {})
+    journal.close()
+
+
 def test_a_list_of_sessions_names_the_broken_one(tmp_path: Path) -> None:
     for name in ("20260101-000000-hexapod-measure", "20260102-000000-hexapod-measure"):
         (tmp_path / name).mkdir()
