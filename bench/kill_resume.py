@@ -96,7 +96,7 @@ def one_session(folder: Path, begin: list[str], dice: random.Random, kills_left:
             break
     assert session is not None
     _, plan = read_folder(session)
-    wanted = [step.id for step in plan.steps if step.kind in ("read", "reference")]
+    wanted = [step.id for step in plan.steps if step.kind.name in ("read", "reference")]
     if sorted(step for step, _ in before) != sorted(wanted):
         found = Counter(step for step, _ in before)
         lacking = {step: found[step] for step in {*wanted, *found} if found[step] != 1}

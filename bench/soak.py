@@ -33,7 +33,7 @@ WARM = 3
 
 async def one(site: Site, root: Path) -> tuple[Path, int]:
     """Measure once; the folder, and how many readings."""
-    plan = measure_plan(site, POSES, PlanOptions(order="pose-by-pose", cycles=10))
+    plan = measure_plan(site, POSES, PlanOptions(order="pose-by-pose", cycles=4, warm_up=False))
     session = Session.create(site, plan, root, unattended=True)
     await session.connect()
     try:
