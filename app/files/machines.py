@@ -39,9 +39,13 @@ def load_machine(name_or_path: str, relative_to: Path | None = None) -> Machine:
     if name_or_path in shipped_machines():
         return _shipped(name_or_path)
     path = (relative_to or Path()) / name_or_path
-    if not path.is_file():
+    try:
+        there = path.is_file()
+    except (OSError, ValueError):  # longer than a name can be, or with signs that none has
+        there = False
+    if not there:
         raise BadInput(
-            f'unknown machine "{name_or_path}"',
+            f'unknown machine "{name_or_path[:80]}"',
             remedy=f"Shipped machines: {', '.join(shipped_machines())}; or give the path of a "
             "machine file",
         )

@@ -83,7 +83,11 @@ def _check(effect: OperatorEffect, declared: tuple[Unknown, ...], table: TomlTab
     """Every unknown is used, does something linear or has a range, and zero means no effect."""
     for one in declared:
         if not any(one.name in expression.names for expression in effect.expressions):
-            raise table.wrong(f"the unknown {one.name!r} is not in the expression", "unknowns")
+            raise table.wrong(
+                f"the unknown {one.name!r} is not in the expression",
+                "unknowns",
+                remedy="Write it there, or leave it out",
+            )
     for one in effect.searched:
         if one.bounds is None:
             raise table.wrong(

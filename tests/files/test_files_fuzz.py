@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from app.cli import run
+from app.files.machines import load_machine
+from app.files.unit_columns import column
 from bench._fuzz_asking import Asker
 from bench._fuzz_kinds import KINDS, Kind, corpus
 from bench._fuzz_mutations import spoilt
@@ -74,6 +76,15 @@ def test_poses_on_one_line_with_an_open_quotation_mark(tmp_path: Path) -> None:
     path.write_text('pose,x,y,z,rx,ry,rz\n"1,0,0,-250,0,0,0\n2,0,0,-250,0,0,0\n')
     new = str(tmp_path / "new")
     assert run(["simulate", "tripod", "--poses", str(path), "--out", new]) == 2
+
+
+def test_a_head_of_blanks_takes_no_time_and_names_too_long_are_no_machine(tmp_path: Path) -> None:
+    measures = {"q1": "mm", "rx": "rad"}
+    assert column("q1" + " " * 30_000 + "x", measures, "here").measures == ""
+    assert column(" rx  [ deg ] ", measures, "here").name == "rx"
+    assert column("q1 (um)", measures, "here").factor == 1e-3
+    with pytest.raises(BadInput, match="unknown machine"):
+        load_machine("(" * 3000, tmp_path)
 
 
 def test_values_that_a_model_does_not_know_are_said(asker: Asker, capsys) -> None:
