@@ -198,9 +198,10 @@ class AsyncStation:
             self._connection, folder / "sessions", unattended=self._operator is None
         )
 
-        async def ask(text: str, answers: tuple[str, ...]) -> str:
+        async def ask(text: str, answers: tuple[str, ...], typed: str) -> str:
             assert decide is not None
-            return await asyncio.to_thread(decide, text, answers)
+            asked = f"{text}; {typed}" if typed else text
+            return await asyncio.to_thread(decide, asked, answers)
 
         flight = Flight(
             laboratory, folder, limits, seed, None if decide is None else ask,

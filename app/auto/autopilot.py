@@ -1,7 +1,6 @@
 """The loop: decide, keep the decision, carry it out, keep what came of it, decide again."""
 
 import math
-import re
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -12,20 +11,19 @@ from app.auto.aside import aside
 from app.auto.findings import Findings, look
 from app.auto.journal import Decisions
 from app.auto.known import HOPELESS, REFUSED, VETOED, known_by, runs_of
-from app.auto.policy import MOST, SURE, Decision, Known, Limits, decide, others
+from app.auto.policy import SURE, Decision, Known, Limits, decide, others
+from app.auto.wording import COUNT, GO, SKIP, STOP, counted, decision_of, in_words
 from app.errors import GateRefused, StoppedByOperator
 from app.files.pose_table import Pose
 from app.jobs.following_up import FollowUpReport, design
 from calib.errors import BadInput
 
-Ask = Callable[[str, tuple[str, ...]], Awaitable[str]]
+Ask = Callable[[str, tuple[str, ...], str], Awaitable[str]]
 """Puts a question with its answers to the person at the machine; returns one of them.
 
-Where the question ends with :data:`COUNT` also a number of poses: ``20 poses``.
+The third says what may be answered in other words; empty: nothing.
 """
 Tell = Callable[[str], None]
-GO, SKIP, STOP = "go on", "skip", "stop"
-COUNT = "; or say how many: 20 poses"
 LEAVE = "leave it"
 SAID = "the operator said no"
 PAYLOAD_KG, TEMPERATURE_K = 0.05, 1.0
@@ -130,7 +128,7 @@ class Autopilot:
         """The decision that was not carried out to its end, or a new one, on the disk."""
         waiting = self.journal.open
         if waiting is not None:
-            return int(waiting["number"]), _decision(waiting)
+            return int(waiting["number"]), decision_of(waiting)
         return await self._decided(decide(known, self.limits))
 
     async def _decided(self, decision: Decision) -> tuple[int, Decision]:
@@ -161,8 +159,8 @@ class Autopilot:
         if self.ask is None or hopeless or self.journal.session_of(number) is not None:
             return number, decision
         choices = {f"{one.words()} instead": one for one in others(known, self.limits, decision)}
-        text = in_words(decision) + (COUNT if decision.kind == "measure" else "")
-        given = await self.ask(text, (GO, SKIP, *choices, STOP))
+        typed = COUNT if decision.kind == "measure" else ""
+        given = await self.ask(in_words(decision), (GO, SKIP, *choices, STOP), typed)
         if given == GO:
             return number, decision
         if given == STOP:
@@ -242,7 +240,7 @@ class Autopilot:
         if differs := self._found().other_conditions(wanted, PAYLOAD_KG, TEMPERATURE_K):
             if self.ask is None:
                 return self._left(decision, f"it needs {differs}, and nobody is there to see to it")
-            if await self.ask(f"put it so: {differs}", ("done", LEAVE)) != "done":
+            if await self.ask(f"put it so: {differs}", ("done", LEAVE), "") != "done":
                 return self._left(decision, f"it needs {differs}, and {SAID}")
         title = f"tells {one} from {other}"
         measured = await self._measured(number, apart.plan.by_label(), title)
@@ -289,29 +287,6 @@ class Autopilot:
         return known_by(self.journal)
 
 
-def in_words(decision: Decision) -> str:
-    """What is done, why, and what is expected of it."""
-    expected = decision.expected
-    gain = ""
-    if "right_then" in expected:
-        now, then = expected["right_now"], expected["right_then"]
-        gain = f" (the right answer with a probability of {now:.2f} now, {then:.2f} then)"
-    elif decision.kind == "measure" and "predicted_um" in expected:
-        gain = f" ({expected['predicted_um']:.1f} um then)"
-    elif "rms_um" in expected:
-        gain = f" ({expected['rms_um']:.1f} um are expected)"
-    return f"{decision.words()}: {decision.why}{gain}"
-
-
-def counted(decision: Decision, said: str) -> Decision | None:
-    """The same measurement with another number of poses (``20 poses``), if that is said."""
-    number = re.fullmatch(r"(\d{1,3})( poses?)?", said.strip())
-    if number is None or decision.kind != "measure" or not 1 <= int(number[1]) <= MOST:
-        return None
-    why = f"{decision.why}; the operator chose how many"
-    return replace(decision, count=int(number[1]), why=why, expected={})
-
-
 def _vetoed(decision: Decision) -> dict[str, Any]:
     no: dict[str, Any] = {VETOED: True, "ground": decision.ground, "says": f"not done: {SAID}"}
     if decision.pair is not None:
@@ -321,11 +296,3 @@ def _vetoed(decision: Decision) -> dict[str, Any]:
 
 def _least(right: Mapping[str, float]) -> float:
     return min(right.values())
-
-
-def _decision(line: Mapping[str, Any]) -> Decision:
-    pair = line["pair"]
-    return Decision(
-        line["kind"], line["why"], int(line["count"]), tuple(pair) if pair else None,
-        line["expected"], line["reached"], line.get("ground", ""),
-    )  # fmt: skip

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from app.auto.wording import found_words
 from app.files.pose_table import Pose
 from app.jobs.corrector import Corrector
 from app.jobs.discovering import DiscoveryReport, discover
@@ -60,10 +61,7 @@ class Findings:
 
     def words(self) -> str:
         """One line for a person."""
-        found = ", ".join(self.effects) or "no effect"
-        doubts = "".join(f"; {a} or {b}?" for a, b in self.ambiguous)
-        unknown = "; something unknown is left" if self.unexplained else ""
-        return f"found: {found}{doubts}{unknown}; {self.predicted_um:.1f} um predicted"
+        return found_words(vars(self))
 
     def other_conditions(self, wanted: Mapping[str, float], kg: float, kelvin: float) -> str:
         """Say which conditions would have to be changed; empty if none."""

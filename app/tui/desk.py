@@ -19,6 +19,7 @@ from app.session import events as ev
 from app.session.plan import Plan
 from app.session.session import Outcome, Session
 from app.session.station import Station
+from app.tui.automatic import DECIDE, Automatic
 from app.tui.correction import KEEP, Corrections
 from app.tui.history_view import LookingBack
 from app.tui.picture import Picture
@@ -54,6 +55,7 @@ class Desk:
         self._mock_log: asyncio.Task[None] | None = None
         self._job: asyncio.Task[Any] | None = None
         self.corrections = Corrections(self)
+        self.automatic = Automatic(self)
         self._connecting = False
         self.study = Study(root, self.picture)
         self.past = LookingBack(root, self.picture)
@@ -219,14 +221,15 @@ class Desk:
         return await self._run(Session.create(station.site, plan, self.root, station=station))
 
     def _hear(self, event: ev.Event) -> None:
-        """Take an event of the station; a write-back begins sessions of its own."""
-        inner = self.corrections.session
+        """Take an event; write-backs and the autopilot begin sessions of their own."""
+        inner = self.corrections.session or self.automatic.session
         if inner is not None and inner is not self.session:
             self.session = inner
             self.picture.begin(inner)
         self.picture.tell(event)
-        if self.corrections.running is not None and isinstance(event, ev.Finished):
-            self.picture.run = "running"  # the check poses are done, the write-back is not
+        outer = self.corrections.running or self.automatic.running
+        if outer is not None and isinstance(event, ev.Finished):
+            self.picture.run = "running"  # the session is done, what began it is not
 
     async def as_job(self, work: Coroutine[Any, Any, _Answer]) -> _Answer:
         """Run something as the one job that the stop key stops."""
@@ -340,11 +343,17 @@ class Desk:
         """Answer the job's question."""
         if prompt == KEEP:
             self.corrections.answer(choice)
+        elif prompt == DECIDE:
+            self.automatic.answer(choice)
         else:
             self._running_session().answer_prompt(prompt, choice)
 
     async def stop(self) -> str:
         """Stop whatever moves, at any moment. Returns what was done, in words."""
+        flight = self.automatic.running
+        if self.busy and flight is not None:
+            await flight.stop()
+            return await self._halt()
         write_back = self.corrections.running
         if self.busy and write_back is not None and write_back.running is not None:
             await write_back.stop()

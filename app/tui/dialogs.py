@@ -6,6 +6,7 @@ from typing import ClassVar, TypeVar
 
 from textual import on
 from textual.app import ComposeResult
+from textual.await_complete import AwaitComplete
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.content import Content
@@ -18,6 +19,8 @@ from app.session.events import PromptNeeded
 from app.tui.widgets.frame import STOP_KEY
 
 _Answer = TypeVar("_Answer")
+ROW = 64
+"""Columns that a dialog has for a row of buttons."""
 
 
 class Dialog(ModalScreen[_Answer | None]):
@@ -31,6 +34,14 @@ class Dialog(ModalScreen[_Answer | None]):
     def __init__(self, title: str) -> None:
         super().__init__()
         self._title = title
+        self._was_left = False
+
+    def dismiss(self, result: _Answer | None = None) -> AwaitComplete:
+        """Close with an answer, once: keys that were pressed after it close nothing else."""
+        if self._was_left:
+            return AwaitComplete()
+        self._was_left = True
+        return super().dismiss(result)
 
     def compose(self) -> ComposeResult:
         """The body, and the line that names the stop key."""
@@ -130,6 +141,48 @@ class Ask(Choose):
     def _look(self) -> None:
         if self.is_active and not self._asked_still():
             self.dismiss(None)
+
+
+class AskOfMany(Ask):
+    """A question of the job with more answers than buttons have room: a list, each with a number.
+
+    Nothing is marked until the operator moves into the list.
+    """
+
+    def __init__(self, prompt: PromptNeeded, asked_still: Callable[[], bool]) -> None:
+        super().__init__(prompt, asked_still)
+        self._choices = prompt.choices
+
+    def body(self) -> ComposeResult:
+        """The question, the answers below each other, and a line for other words."""
+        with VerticalScroll(classes="dialog-text", can_focus=False):
+            yield Static(Content(self._text))
+        says = [f"{number}  {one}" for number, one in enumerate(self._choices, start=1)]
+        yield OptionList(
+            *(Option(Content(text), id=one) for text, one in zip(says, self._choices, strict=True))
+        )
+        if self._typed:
+            yield Input(placeholder=self._typed)
+
+    def on_key(self, event: Key) -> None:
+        """Take a number for an answer; arrows move into the list."""
+        listed = self.query_one(OptionList)
+        if event.key.isdigit() and 1 <= int(event.key) <= len(self._choices):
+            event.stop()
+            self.dismiss(self._choices[int(event.key) - 1])
+        elif event.key in ("down", "up") and self.focused is not listed:
+            listed.focus()
+            listed.highlighted = 0
+
+    @on(OptionList.OptionSelected)
+    def _picked(self, event: OptionList.OptionSelected) -> None:
+        self.dismiss(event.option.id)
+
+
+def question(prompt: PromptNeeded, asked_still: Callable[[], bool]) -> Ask:
+    """The dialog for a question: buttons in a row, or a list where they have no room."""
+    room = sum(len(choice) + 9 for choice in prompt.choices)
+    return (Ask if room <= ROW else AskOfMany)(prompt, asked_still)
 
 
 class Enter(Dialog[str]):

@@ -1,6 +1,7 @@
 """From what the operator wishes to measure to the plan: poses chosen or read, steps expanded."""
 
 import asyncio
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -12,11 +13,13 @@ from textual.containers import Horizontal
 from textual.content import Content
 from textual.widgets import Button, Checkbox, Input, RadioButton, RadioSet, Static
 
+from app.defaults import FEWEST_FIRST, MOST_FIRST
 from app.files.pose_table import Pose, read_poses
 from app.files.poses import full_poses, nest_matrix, read_pose_file
 from app.files.site import Site
 from app.session.plan import Plan
 from app.session.plans import Order, PlanOptions, measure_plan
+from app.tui.automatic import FlightWish
 from app.tui.dialogs import Dialog
 from calib.poses import design_poses
 from calib.poses.margin import stroke_margin
@@ -119,3 +122,50 @@ class NewRun(Dialog[RunWish]):
         pressed = self.query_one("#order", RadioSet).pressed_index
         order: Order = "pose-by-pose" if pressed == 1 else "nest-by-nest"
         self.dismiss(RunWish(poses, order, self.query_one("#warm-up", Checkbox).value))
+
+
+class NewFlight(Dialog[FlightWish]):
+    """The form for the autopilot."""
+
+    escape_says: ClassVar[str] = "tab: next field   enter: start   esc: close"
+
+    def __init__(self) -> None:
+        super().__init__("Decide by itself")
+
+    def body(self) -> ComposeResult:
+        """Target, time, first set, writing, start."""
+        for name, value, says in (
+            ("target", "8", "RMS position error at fresh poses that is wanted, µm:"),
+            ("hours", "", "Hours of machine time for all readings (empty: no limit):"),
+            ("first", "15", f"Poses to begin with, {FEWEST_FIRST} to {MOST_FIRST}:"),
+        ):
+            yield Static(Content(says), classes="form-label")
+            yield Input(value, id=name, compact=True)
+        yield Check("write to the machine what passes every gate", True, id="write", compact=True)
+        with Horizontal(classes="dialog-buttons"):
+            yield Button("Start", variant="success", id="start")
+
+    @on(Input.Submitted)
+    @on(Button.Pressed)
+    def _start(self) -> None:
+        texts = {name: self.query_one(f"#{name}", Input).value for name in ("target", "hours")}
+        hours = texts["hours"].strip()
+        target = positive(texts["target"])
+        if target is None or (hours and positive(hours) is None):
+            self.notify("Give the target, and hours if there is a limit, as positive numbers.")
+            return
+        first = self.query_one("#first", Input).value.strip()
+        if not first.isdigit() or not FEWEST_FIRST <= int(first) <= MOST_FIRST:
+            self.notify(f"Begin with {FEWEST_FIRST} to {MOST_FIRST} poses.")
+            return
+        apply = self.query_one("#write", Checkbox).value
+        self.dismiss(FlightWish(target, positive(hours), int(first), apply))
+
+
+def positive(text: str) -> float | None:
+    """A positive number that was typed; None if it is none."""
+    try:
+        value = float(text.strip().replace(",", "."))
+    except ValueError:
+        return None
+    return value if 0.0 < value < math.inf else None

@@ -16,9 +16,10 @@ from textual.screen import Screen
 from app.errors import GateRefused, StoppedByOperator
 from app.session.events import PromptNeeded
 from app.tui.apply import ApplyFace
+from app.tui.auto import AutoFace
 from app.tui.desk import POLL_S, Desk
 from app.tui.devices import DevicesFace
-from app.tui.dialogs import Ask, Choose, Help
+from app.tui.dialogs import Choose, Help, question
 from app.tui.discover import DiscoverFace
 from app.tui.face import Face
 from app.tui.fit import FitFace
@@ -37,7 +38,7 @@ from calib.errors import BadInput
 from drivers.errors import DeviceError
 
 FACES: tuple[type[Face], ...] = (
-    DevicesFace, MeasureFace, FitFace, DiscoverFace, ApplyFace, VerifyFace, LogFace,
+    DevicesFace, MeasureFace, FitFace, DiscoverFace, ApplyFace, VerifyFace, LogFace, AutoFace,
 )  # fmt: skip
 SIDES: tuple[type[Face], ...] = (ResidualsFace, HistoryFace, WatchFace)
 """Screens that are reached from others, and left with escape."""
@@ -121,7 +122,8 @@ class Workbench(Painted[None]):
 
     async def _warm_up(self) -> None:
         """Import what the analysis needs while the operator looks at the first screen."""
-        await asyncio.to_thread(import_module, "app.tui.discovering")
+        for module in ("app.tui.discovering", "app.auto.flight"):
+            await asyncio.to_thread(import_module, module)
 
     async def _watch_devices(self) -> None:
         while True:
@@ -258,7 +260,7 @@ class Workbench(Painted[None]):
                 except GateRefused as late:  # the job has ended meanwhile
                     self.put_up(late)
 
-        self.push_screen(Ask(prompt, asked_still), answered)
+        self.push_screen(question(prompt, asked_still), answered)
 
     # the palette
 

@@ -94,16 +94,18 @@ async def fly(
         await station.close()
 
 
-async def ask(text: str, answers: tuple[str, ...]) -> str:
+async def ask(text: str, answers: tuple[str, ...], typed: str) -> str:
     """Ask the person at the terminal; answers are numbered, the first is proposed."""
+    from app.auto.wording import number_of_poses
     from app.console import in_daemon_thread
 
     def asked() -> str:
         for number, one in enumerate(answers, start=1):
             answer.say(f"  {number}  {one}")
         while True:
-            given: str = click.prompt(f"{text}. Which", default="1", err=True)
-            if given in answers or given.endswith(" poses"):
+            which = f"Which ({typed})" if typed else "Which"
+            given: str = click.prompt(f"{text}. {which}", default="1", err=True)
+            if given in answers or (typed and number_of_poses(given)):
                 return given
             if given.isdigit() and 1 <= int(given) <= len(answers):
                 return answers[int(given) - 1]

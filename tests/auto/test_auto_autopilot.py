@@ -61,9 +61,10 @@ class Operator:
     def __init__(self, *answers: str) -> None:
         self.answers, self.asked = list(answers), list[str]()
 
-    async def __call__(self, text: str, answers: tuple[str, ...]) -> str:
+    async def __call__(self, text: str, answers: tuple[str, ...], typed: str) -> str:
         assert answers[:2] == ("go on", "skip")
         assert answers[-1] == "stop"
+        assert bool(typed) == text.startswith("measure")
         self.asked.append(text)
         return self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
 

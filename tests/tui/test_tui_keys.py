@@ -268,3 +268,17 @@ async def test_discover_adds_refuses_and_removes(bench: Workbench) -> None:
             while study.effects:  # noqa: ASYNC110
                 await asyncio.sleep(0.05)
         assert study.search.stairs[-1].rms_um == before.rms_um
+
+
+@pytest.mark.timeout(30)
+async def test_keys_behind_an_answer_close_nothing_else(bench: Workbench, tmp_path: Path) -> None:
+    async with bench.run_test(size=(80, 24)) as pilot:
+        await stream.put_up(bench, tmp_path)
+        bench.desk.picture.tell(stream.QUESTION)
+        await pilot.pause(0.3)
+        dialog = bench.screen
+        assert isinstance(dialog, Ask)
+        dialog.dismiss("done")
+        dialog.dismiss("stop")
+        await pilot.pause(0.2)
+        assert isinstance(bench.screen, Face)

@@ -36,6 +36,7 @@ async def full(pilot: Pilot[Any], folder: Path) -> Workbench:
     await stream.put_up(bench, folder)
     desk = bench.desk
     desk.study.answer = stream.fitted()
+    desk.automatic.show(stream.flown(folder / "auto-20261122-0800"))
     desk.study.search = stream.searched()
     desk.before, desk.after = stream.verified(600.0, 1), stream.verified(5.0, 2)
     desk.corrections.comparison = stream.compared()
@@ -99,7 +100,22 @@ def test_question_with_a_fault_on_the_banner(
     assert snap_compare(Workbench(root=tmp_path), terminal_size=size, run_before=show)
 
 
-@pytest.mark.parametrize("key", ["f1", "n", "m"], ids=["help", "new-run", "mock"])
+@pytest.mark.parametrize("size", SIZES, ids=["80x24", "160x48"])
+def test_decision_of_the_autopilot(
+    snap_compare: Look, tmp_path: Path, size: tuple[int, int]
+) -> None:
+    async def show(pilot: Pilot[Any]) -> None:
+        bench = await full(pilot, tmp_path)
+        await pilot.press("8")
+        bench.desk.picture.tell(stream.DECISION)
+        await pilot.pause(0.6)
+
+    assert snap_compare(Workbench(root=tmp_path), terminal_size=size, run_before=show)
+
+
+@pytest.mark.parametrize(
+    "key", ["f1", "n", "m", "a"], ids=["help", "new-run", "mock", "decide-by-itself"]
+)
 def test_dialog(snap_compare: Look, tmp_path: Path, key: str) -> None:
     async def show(pilot: Pilot[Any]) -> None:
         if key == "n":
@@ -108,6 +124,10 @@ def test_dialog(snap_compare: Look, tmp_path: Path, key: str) -> None:
 
             (tmp_path / "site.toml").write_text(stream.SITE, encoding="utf-8")
             pilot.app.push_screen(NewRun(load_site(tmp_path / "site.toml")))
+        elif key == "a":
+            from app.tui.planning import NewFlight
+
+            pilot.app.push_screen(NewFlight())
         else:
             await pilot.press(key)
         await pilot.pause(0.3)

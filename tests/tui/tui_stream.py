@@ -1,8 +1,10 @@
 """A recorded stream of a session's events, and what else the screens need to be looked at."""
 
+import json
 import math
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -61,6 +63,14 @@ QUESTION = ev.PromptNeeded(
     ("done", "stop"),
     None,
 )
+DECISION = ev.PromptNeeded(
+    "decide",
+    "tell tracker-drift from frame-shift: the readings cannot tell tracker-drift from frame-shift "
+    "(the right answer with a probability of 0.93 now, 1.00 then)",
+    ("go on", "skip", "measure 7 poses instead", "tell backlash from nothing instead",
+     "write the correction instead", "stop"),
+    None,
+)  # fmt: skip
 
 
 def plan_of(site: Site, poses: int = 12) -> Plan:
@@ -257,6 +267,36 @@ def searched() -> Search:
     ]
     view = View(("screw-cyclic",), None, diagnosis, comparison, found)
     return Search((), None, stairs, view)
+
+
+def flown(folder: Path) -> Path:
+    """The journal of an autopilot that has told a pair apart and asks whether to write."""
+    run = "sessions/20261122-0800-hexapod-measure"
+    plain: dict[str, Any] = {"pair": None, "expected": {}, "reached": None, "count": 0}
+    lines: list[dict[str, Any]] = [
+        {"event": "begun", "seed": 1,
+         "limits": {"target_um": 8.0, "minutes": 360.0, "first": 15, "apply": True}},
+        {"event": "decided", "number": 1, **plain, "kind": "measure", "count": 15,
+         "why": "nothing was measured yet"},
+        {"event": "done", "number": 1, "run": f"{run}/run", "poses": 15, "minutes": 30.2},
+        {"event": "found", "runs": [f"{run}/run"], "model": "model-01.toml",
+         "effects": ["backlash", "tracker-drift"], "unexplained": False, "conditions": {},
+         "ambiguous": [["tracker-drift", "frame-shift"]], "predicted_um": 9.1},
+        {"event": "decided", "number": 2, **plain, "kind": "tell-apart", "count": 10,
+         "pair": ["tracker-drift", "frame-shift"],
+         "why": "the readings cannot tell tracker-drift from frame-shift",
+         "expected": {"right_now": 0.93, "right_then": 1.0}},
+        {"event": "done", "number": 2, "run": f"{run}-2/run", "poses": 10, "minutes": 17.2},
+        {"event": "found", "runs": [f"{run}/run", f"{run}-2/run"], "model": "model-02.toml",
+         "effects": ["backlash"], "unexplained": False, "conditions": {}, "ambiguous": [],
+         "predicted_um": 3.0},
+        {"event": "decided", "number": 3, **plain, "kind": "apply", "ground": "write",
+         "why": "3.0 um are predicted, 8 um are wanted", "expected": {"predicted_um": 3.0}},
+    ]  # fmt: skip
+    folder.mkdir()
+    text = "".join(json.dumps(line) + "\n" for line in lines)
+    (folder / "decisions.jsonl").write_text(text, encoding="utf-8")
+    return folder
 
 
 def fitted() -> FitAnswer:

@@ -76,7 +76,7 @@ class TabLine(Widget):
                 parts.append(f"[bold reverse]▸{number} {label} [/]")
             else:
                 parts.append(f"[@click=app.show_face('{mode}')] [bold]{number}[/] {label} [/]")
-        return Content.from_markup(" ".join(parts))
+        return Content.from_markup("".join(parts))
 
 
 class Banner(Static):

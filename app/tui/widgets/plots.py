@@ -158,6 +158,36 @@ class SeriesPlot(QuietPlot):
         self.border_title = f"{name}, {unit}{against}, over days"
 
 
+class TargetPlot(QuietPlot):
+    """Named series of x and y as markers, and a line at what is wanted."""
+
+    def show(
+        self, series: Mapping[str, tuple[Array, Array]], target: float | None, key: object
+    ) -> None:
+        """Draw the line, and the series over it; nothing without a target."""
+        if not self.changed(key):
+            return
+        self.clear()
+        if target is None:
+            return
+        ends = [float(bound) for x, _ in series.values() for bound in x]
+        low, high = 0.0, 1.1 * max(ends, default=10.0)
+        tops = [float(value) for _, y in series.values() for value in y]
+        self.set_xlimits(low, high)
+        self.set_ylimits(0, 1.1 * max([target, *tops]))
+        self.plot(
+            np.array([low, high]), np.full(2, target), line_style="#7d8d9a",
+            hires_mode=HiResMode.BRAILLE,
+        )  # fmt: skip
+        for (x, y), (marker, style) in zip(series.values(), SERIES, strict=False):
+            if len(x):
+                self.scatter(x, y, marker=marker, marker_style=style)
+        signs = "   ".join(
+            f"{sign} {name}" for name, (sign, _) in zip(series, SERIES, strict=False)
+        )
+        self.border_subtitle = f"{signs}   ─ wanted"
+
+
 class Decades(NumericAxisFormatter):
     """Labels an axis of logarithms with the numbers themselves."""
 
