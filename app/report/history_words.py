@@ -1,6 +1,5 @@
 """Words for what a machine did over months."""
 
-from datetime import datetime
 from typing import Protocol
 
 from app.report.words import with_uncertainty
@@ -20,11 +19,6 @@ class Drifts(Protocol):
     @property
     def months(self) -> float | None:
         """None if never, or nothing is known of that."""
-
-
-def clock(utc: str) -> str:
-    """A moment by the clock of this computer: ``2026-11-29 07:14``."""
-    return f"{datetime.fromisoformat(utc).astimezone():%Y-%m-%d %H:%M}" if utc else "?"
 
 
 def drift_words(found: Drifts, unit: str) -> str:

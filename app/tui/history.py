@@ -11,8 +11,9 @@ from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.content import Content
 from textual.widgets import DataTable, Static
 
-from app.report.history_words import clock, drift_words
+from app.report.history_words import drift_words
 from app.report.words import with_uncertainty
+from app.show.clocks import clock
 from app.tui.face import Face
 from app.tui.history_view import series_of
 from app.tui.picture import Picture

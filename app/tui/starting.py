@@ -1,11 +1,11 @@
 """The empty first screen: the whole job as a list, what lies in the folder, a run to try it on."""
 
-from datetime import datetime
 from pathlib import Path
 
 from textual.content import Content
 
 from app.session.listing import SessionFacts
+from app.show.clocks import clock
 from app.tui.next_step import JobStep
 
 MYSTERY = Path(__file__).parents[2] / "tests" / "data" / "runs" / "mystery"
@@ -14,12 +14,10 @@ MYSTERY = Path(__file__).parents[2] / "tests" / "data" / "runs" / "mystery"
 
 def session_words(facts: SessionFacts) -> str:
     """One session in a list: when, what, of which machine, how far, title."""
-    when = facts.begun_utc
-    clock = f"{datetime.fromisoformat(when).astimezone():%Y-%m-%d %H:%M}" if when else "?"
     state = "" if facts.state == "finished" else f", {facts.done} of {facts.steps} steps"
     machine = f"{facts.machine} {facts.serial}".strip()
     title = f" · {facts.title}" if facts.title else ""
-    return f"{clock}  {facts.purpose}, {machine}{state}{title}"
+    return f"{clock(facts.begun_utc)}  {facts.purpose}, {machine}{state}{title}"
 
 
 def start_text(steps: list[JobStep], recent: list[SessionFacts]) -> Content:

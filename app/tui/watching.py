@@ -2,10 +2,10 @@
 
 import asyncio
 import time
-from datetime import datetime
 from pathlib import Path
 
 from app.session.listing import Following, Happening, SessionFacts
+from app.show.clocks import happening_line
 from app.tui.picture import Level, Picture
 
 SILENT_S = 30.0
@@ -37,7 +37,8 @@ class Watching:
             if one.kind == "started":
                 self.doing = one.text
             else:
-                self.picture.write(_line(one), _LEVELS.get(one.kind, "info"))
+                line = happening_line(one.utc, one.kind, one.text)
+                self.picture.write(line, _LEVELS.get(one.kind, "info"))
         if news:
             self._quiet_since = time.monotonic()
         return bool(news)
@@ -50,8 +51,3 @@ class Watching:
         """How long nothing has happened, where that is worth a word; 0 where it is not."""
         quiet = time.monotonic() - self._quiet_since
         return quiet if quiet > SILENT_S and self.facts.state == "begun" else 0.0
-
-
-def _line(one: Happening) -> str:
-    clock = f"{datetime.fromisoformat(one.utc).astimezone():%H:%M:%S}" if one.utc else "        "
-    return f"{clock}  {one.kind:8}  {one.text}"

@@ -1,7 +1,6 @@
 """Watch a session that another terminal runs"""
 
 import time
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,9 +8,10 @@ import click
 
 from app import answer
 from app.plain_data import printable
+from app.show.clocks import happening_line
 
 if TYPE_CHECKING:
-    from app.session.listing import Following, Happening
+    from app.session.listing import Following
 
 POLL_S = 0.5
 SILENT_S = 30.0
@@ -63,7 +63,8 @@ def _watch(followed: "Following") -> None:
         while True:
             for one in news:
                 if one.kind != "started":
-                    console.print(printable(_line(one)), markup=False)
+                    line = happening_line(one.utc, one.kind, one.text)
+                    console.print(printable(line), markup=False)
             facts = followed.facts
             doing = next((one.text for one in reversed(news) if one.kind == "started"), None)
             bar.update(task, completed=facts.done, total=facts.steps)
@@ -77,8 +78,3 @@ def _watch(followed: "Following") -> None:
                 return
             time.sleep(POLL_S)
             news = followed.news()
-
-
-def _line(one: "Happening") -> str:
-    clock = f"{datetime.fromisoformat(one.utc).astimezone():%H:%M:%S}" if one.utc else "        "
-    return f"{clock}  {one.kind:8}  {one.text}"

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 import click
 
 from app import answer
-from app.report.history_words import clock, drift_words
+from app.report.history_words import drift_words
 from app.report.words import with_uncertainty
+from app.show.clocks import clock
 
 if TYPE_CHECKING:
     from app.jobs.looking_back import MachineEntry, SeriesEntry

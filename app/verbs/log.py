@@ -1,11 +1,11 @@
 """Read what happened in a session, by the clock"""
 
-from datetime import datetime
 from pathlib import Path
 
 import click
 
 from app import answer
+from app.show.clocks import happening_line
 
 QUIET = ("started",)
 """Kinds of entries that only --all shows: their ends tell as much."""
@@ -32,12 +32,8 @@ def command(session: Path | None, folder: Path, everything: bool, as_json: bool)
         f"{head.state}, {head.done} of {head.steps} steps, {head.readings} readings",
     ]
     lines += [
-        f"{_time(one.utc)}  {one.kind:8}  {one.text}"
+        happening_line(one.utc, one.kind, one.text)
         for one in found.entries
         if everything or one.kind not in QUIET
     ]
     answer.show(found.to_json(), as_json, "\n".join(lines))
-
-
-def _time(utc: str) -> str:
-    return f"{datetime.fromisoformat(utc).astimezone():%H:%M:%S}" if utc else "        "

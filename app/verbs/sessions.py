@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from app import answer
-from app.report.history_words import clock
+from app.show.clocks import clock
 
 if TYPE_CHECKING:
     from app.jobs.listing import SessionEntry

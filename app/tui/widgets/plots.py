@@ -176,12 +176,12 @@ class TargetPlot(QuietPlot):
         self.set_xlimits(low, high)
         self.set_ylimits(0, 1.1 * max([target, *tops]))
         self.plot(
-            np.array([low, high]), np.full(2, target), line_style="#7d8d9a",
+            np.array([low, high]), np.full(2, target), line_style=self.tint("quiet"),
             hires_mode=HiResMode.BRAILLE,
         )  # fmt: skip
         for (x, y), (marker, style) in zip(series.values(), SERIES, strict=False):
             if len(x):
-                self.scatter(x, y, marker=marker, marker_style=style)
+                self.scatter(x, y, marker=marker, marker_style=self.tint(style))
         signs = "   ".join(
             f"{sign} {name}" for name, (sign, _) in zip(series, SERIES, strict=False)
         )
