@@ -19,6 +19,8 @@ MOST_MM = 500.0
 """Offset, mm, beyond which no number was mistyped."""
 ALONG = 0.95
 """Part of an offset along the normal of the nests from which on it is the SMR's size."""
+CLEARLY = 0.99
+"""Part of the scatter in one frame that is left in the other, where that is the one."""
 RADII = {"1.5 inch": 19.05, "7/8 inch": 11.1125, "0.5 inch": 6.35, "30 mm": 15.0, "20 mm": 10.0}
 """Radii of SMRs that are sold, mm."""
 MATCH = 0.15
@@ -57,11 +59,11 @@ def _taken(
 ) -> tuple[Run, Remark]:
     """The SMR off alike in the platform frame, or in that of the base: where it scatters less.
 
-    ``back`` (3, N) is how far off it is, platform frame.
+    ``back`` (3, N) is how far off it is, platform frame; which is meant where nothing turns.
     """
     lines, own = places.rows.line[which], back[:, which]
     room = np.einsum("ijn,jn->in", places.rotation[:, :, which], own)
-    if np.sum(np.var(room, axis=1)) < np.sum(np.var(own, axis=1)):
+    if np.sum(np.var(room, axis=1)) < CLEARLY * np.sum(np.var(own, axis=1)):
         return lifted(places.run, name, lines, np.median(room, axis=1), rotation)
     return seated(places.run, name, lines, np.median(own, axis=1))
 
