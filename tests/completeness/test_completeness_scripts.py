@@ -16,6 +16,7 @@ OTHERWISE = {
     "log": ("session_log",),
     "history": ("history_of",),
     "machine complete": ("complete",),
+    "fleet fit": ("fit_fleet",),
     "mock": ("mock_station",),
     "undo": ("undo", "sets", "accept"),
 }
