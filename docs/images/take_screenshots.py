@@ -2,6 +2,7 @@
 
 python docs/images/take_screenshots.py              (all, about three minutes)
 python docs/images/take_screenshots.py analysis     (those on runs from the disk: seconds)
+python docs/images/take_screenshots.py auto         (the autopilot: a minute)
 """
 
 import asyncio
@@ -58,13 +59,19 @@ class Photographer:
         (HERE / f"{name}.svg").write_text(picture, encoding="utf-8")
 
 
-async def connect_and_measure(photographer: Photographer) -> None:
-    """Devices, a first verification, and a measurement with the plot half full."""
-    bench, desk = photographer.bench, photographer.bench.desk
-    await photographer.keys("m")
+async def start_mock(photographer: Photographer) -> None:
+    """A mock machine of our own, connected."""
+    bench = photographer.bench
+    await photographer.keys("1", "m")
     bench.screen.query_one(Input).value = MOCK
     await photographer.keys("enter")
-    await photographer.until(lambda: desk.connected)
+    await photographer.until(lambda: bench.desk.connected)
+
+
+async def connect_and_measure(photographer: Photographer) -> None:
+    """Devices, a first verification, and a measurement with the plot half full."""
+    desk = photographer.bench.desk
+    await start_mock(photographer)
     await photographer.keys("6", "v", "q")
     await photographer.until(lambda: desk.after is not None)
     await photographer.keys("2", "n", "enter")
@@ -129,7 +136,24 @@ async def job(photographer: Photographer) -> None:
     await correct(photographer)
 
 
-PARTS = {"job": job, "analysis": discover}
+async def automatic(photographer: Photographer) -> None:
+    """The autopilot, at the question after its first poses."""
+    bench, desk = photographer.bench, photographer.bench.desk
+    if not desk.connected:
+        await start_mock(photographer)
+    await photographer.keys("8", "n")
+    bench.screen.query_one("#first", Input).value = "12"
+    await photographer.keys("enter")
+    await photographer.until(lambda: isinstance(bench.screen, Ask))
+    await photographer.keys("g")
+    await photographer.until(lambda: not isinstance(bench.screen, Ask))
+    await photographer.until(lambda: isinstance(bench.screen, Ask))
+    await photographer.picture("auto")
+    await photographer.keys("escape", "ctrl+x")
+    await photographer.until(lambda: not desk.busy)
+
+
+PARTS = {"job": job, "analysis": discover, "auto": automatic}
 
 
 async def main(parts: list[str]) -> None:

@@ -13,6 +13,8 @@ from drivers.linuxcnc.watch import Watch
 
 AGREES_MM = 1e-6
 """How far LinuxCNC's joints may end from the lengths that its own pins give."""
+STAYS_S = 1.0
+"""For how long, at rest, they may be farther: while what is added to them is on its way."""
 FOUND_MM = 1e-3
 """How far the pose that it found may be from its joints."""
 POLL_S = 0.02
@@ -182,22 +184,30 @@ class Motion:
         if self._said:
             said = "; ".join(self._said)
             raise DeviceFault(f"stopped on the way: {said}", device=self._device)
-        if self.targets is not None:
-            await self._compare(state)
+        await self._compare(stops, state)
 
-    async def _compare(self, state: Answer) -> None:
-        """LinuxCNC must have sent the joints where its own pins say that the pose is."""
-        assert self.targets is not None
-        added = await self.added()
-        sent = [state["commanded"][n] - added[n] for n in range(len(added))]
-        off = [abs(a - b) for a, b in zip(sent, self.targets, strict=True)]
-        if not max(off) < AGREES_MM:
-            n = off.index(max(off))
-            raise DeviceFault(
-                f"joint {n} was sent {max(off):.6f} mm beside the strut's length at this pose",
-                device=self._device,
-                remedy="Something else moves the machine, or it has changed pins meanwhile",
-            )
+    async def _compare(self, stops: int, state: Answer) -> None:
+        """LinuxCNC must have sent the joints where its own pins say that the pose is.
+
+        What it adds for backlash and screws is read after where it sent them, and may still be on
+        its way: a difference counts once it stays.
+        """
+        deadline = asyncio.get_running_loop().time() + STAYS_S
+        while self.targets is not None:
+            added = await self.added()
+            sent = [state["commanded"][n] - added[n] for n in range(len(added))]
+            off = [abs(a - b) for a, b in zip(sent, self.targets, strict=True)]
+            if max(off) < AGREES_MM:
+                return
+            if asyncio.get_running_loop().time() > deadline:
+                n = off.index(max(off))
+                raise DeviceFault(
+                    f"joint {n} was sent {max(off):.6f} mm beside the strut's length at this pose",
+                    device=self._device,
+                    remedy="Something else moves the machine, or it has changed pins meanwhile",
+                )
+            await asyncio.sleep(POLL_S)
+            state = await self._checked(stops)
 
     async def _checked(self, stops: int) -> Answer:
         """The state, unless a fault stands or the motion was stopped."""
