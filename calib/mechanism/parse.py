@@ -170,7 +170,9 @@ def _actuator(name: str, table: TomlTable) -> Actuator:
     limits, home = table.limits("limits", unit), table.quantity("home", unit)
     if not limits[0] <= home <= limits[1]:
         raise table.wrong(
-            f"home {home:g} of {name} is outside its limits {limits[0]:g}..{limits[1]:g}", "home"
+            f"home {home:g} of {name} is outside its limits {limits[0]:g}..{limits[1]:g}",
+            "home",
+            remedy="Write a home within them, or wider limits",
         )
     table.text("says", "")
     return Actuator(

@@ -32,7 +32,7 @@ def line_with(text: str, part: str) -> int:
         ('rx = ["-15 deg"', 'rx = ["15 deg"', "lower limit", ""),
         ('reference = "leg1.L0"', 'reference = "leg1.L9"', '"leg1.L9" is not a parameter', ""),
         ("limits = [195.0, 265.0]", "limit = [195.0, 265.0]", 'unknown key "limit"', "limits"),
-        ("home = 230.715, limits", "home = 300.0, limits", "outside its limits", ""),
+        ("home = 230.715, limits", "home = 300.0, limits", "outside its limits", "wider limits"),
         ('q = "q1"', 'q = "q9"', "q9", "q1, q2"),
         ('type = "leg"', 'type = "lag"', 'limb type "lag"', "leg"),
         ("B_x = 173.866648732032", "B_xx = 173.87", "no nominal value", "limb"),
