@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -83,7 +83,8 @@ class Refitter:
         self.rows = rows
         self.effects = {effect.id: effect for effect in catalogue}
         self._masked = tuple(masked)
-        self._seed = seed
+        # A stage does not hold the refitter that holds it: its arrays go when nobody asks for it.
+        self._examine = partial(judge, catalogue=tuple(self.effects.values()), seed=seed)
         self._watch = watch
         self._fits: dict[tuple[str, ...], Fit] = {}
         self._stages: dict[tuple[str, ...], RunStage] = {}
@@ -113,9 +114,6 @@ class Refitter:
             held = float("inf") if stuck else hold_out(fitted).rms_mm
             self._stages[names] = RunStage(names, held, fitted, self._examine)
         return self._stages[names]
-
-    def _examine(self, fitted: Fit) -> RunDiagnosis:
-        return judge(fitted, tuple(self.effects.values()), self._seed)
 
     def _effect(self, name: str) -> Effect:
         try:
