@@ -59,7 +59,9 @@ def _watch(followed: "Following") -> None:
     with Progress(
         *columns, console=console, transient=True, disable=not console.is_terminal
     ) as bar:
-        task = bar.add_task("", total=None)
+        # A bar that counts steps needs their number from the start: it draws itself at once.
+        begun = followed.facts
+        task = bar.add_task("", completed=begun.done, total=begun.steps)
         while True:
             for one in news:
                 if one.kind != "started":

@@ -82,10 +82,12 @@ def test_a_session_is_followed_while_it_goes_on(tmp_path: Path) -> None:
     assert (followed.facts.state, followed.facts.done) == ("begun", 1)
     journal.set_meta("finished_utc", "2026-11-29T06:00:03+00:00")
     journal.close()
-    said = CliRunner().invoke(pkmcal, ["attach", str(folder)])
-    assert said.exit_code == 0
-    assert plan.steps[0].says in said.output
-    assert "finished" in said.output
+    # Once where the answer is kept, once as a terminal would have it, with its bar.
+    for kind in ({}, {"FORCE_COLOR": "1"}):
+        said = CliRunner().invoke(pkmcal, ["attach", str(folder)], env=kind)
+        assert said.exit_code == 0, said.exception
+        assert plan.steps[0].says in said.output
+        assert "finished" in said.output
 
 
 def test_what_changed_more_than_chance_is_named_and_a_drift_has_its_forecast(root: Path) -> None:
