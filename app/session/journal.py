@@ -229,9 +229,11 @@ class Journal:
             ),
         )  # fmt: skip
 
-    def log(self) -> list[tuple[str, float, str, str, dict[str, Any]]]:
-        """Every entry of the log: UTC, time in s, step, state, result."""
-        rows = self._db.execute("SELECT utc, time_s, step, state, result FROM log ORDER BY seq")
+    def log(self, after: int = 0) -> list[tuple[str, float, str, str, dict[str, Any]]]:
+        """Entries of the log after the first so many: UTC, time in s, step, state, result."""
+        rows = self._db.execute(
+            "SELECT utc, time_s, step, state, result FROM log WHERE seq > ? ORDER BY seq", (after,)
+        )
         return [(*tuple(row)[:4], json.loads(row["result"])) for row in rows]
 
     # rows
@@ -322,9 +324,11 @@ class Journal:
         rows = self._db.execute("SELECT time_s, kind, text FROM notes ORDER BY seq")
         return [(row["time_s"], row["kind"], row["text"]) for row in rows]
 
-    def noted(self) -> list[tuple[str, float, str, str]]:
-        """UTC, time in s, kind and text of every note."""
-        rows = self._db.execute("SELECT utc, time_s, kind, text FROM notes ORDER BY seq")
+    def noted(self, after: int = 0) -> list[tuple[str, float, str, str]]:
+        """UTC, time in s, kind and text of the notes after the first so many."""
+        rows = self._db.execute(
+            "SELECT utc, time_s, kind, text FROM notes WHERE seq > ? ORDER BY seq", (after,)
+        )
         return [(row["utc"], row["time_s"], row["kind"], row["text"]) for row in rows]
 
 

@@ -83,18 +83,29 @@ class Happening:
 
 def happenings(folder: Path) -> list[Happening]:
     """Everything that a session's journal tells, in order; raises BadInput if there is none."""
+    steps, notes = _told(folder, _says(folder))
+    return sorted((*steps, *notes), key=lambda one: one.utc)
+
+
+def _says(folder: Path) -> dict[str, str]:
+    """What each step of a session's plan is called."""
     plan = json.loads(read_text(folder / PLAN))
-    says = {step["id"]: step["says"] for step in plan["steps"]}
-    journal = Journal(folder / JOURNAL, read_only=True)
+    return {step["id"]: step["says"] for step in plan["steps"]}
+
+
+def _told(
+    folder: Path, says: Mapping[str, str], known: tuple[int, int] = (0, 0), *, checked: bool = True
+) -> tuple[list[Happening], list[Happening]]:
+    """Entries of steps and notes, after the first ``known`` of each."""
+    journal = Journal(folder / JOURNAL, read_only=True, checked=checked)
     try:
         steps = [
             Happening(utc, time_s, state, _step_words(says.get(step, step), result))
-            for utc, time_s, step, state, result in journal.log()
+            for utc, time_s, step, state, result in journal.log(known[0])
         ]
-        notes = [Happening(utc, time_s, kind, text) for utc, time_s, kind, text in journal.noted()]
+        return steps, [Happening(*note) for note in journal.noted(known[1])]
     finally:
         journal.close()
-    return sorted((*steps, *notes), key=lambda one: one.utc)
 
 
 def _step_words(says: str, result: Mapping[str, Any]) -> str:
@@ -118,17 +129,22 @@ class Following:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._told = 0
+        self._says = _says(folder)
+        self._known = (0, 0)
+        self._facts: SessionFacts | None = None
         happenings(folder)
 
     @property
     def facts(self) -> SessionFacts:
-        """How far it has come by now."""
-        return facts_of(self.folder)
+        """How far it has come by now; what is finished is asked again when it goes on."""
+        if self._facts is None or self._facts.state != "finished":
+            self._facts = facts_of(self.folder)
+        return self._facts
 
     def news(self) -> list[Happening]:
-        """What has happened since this was asked the last time."""
-        found = happenings(self.folder)
-        fresh = found[self._told :]
-        self._told = len(found)
-        return fresh
+        """What has happened since this was asked the last time; nothing else is read."""
+        steps, notes = _told(self.folder, self._says, self._known, checked=False)
+        if steps or notes:
+            self._facts = None
+            self._known = (self._known[0] + len(steps), self._known[1] + len(notes))
+        return sorted((*steps, *notes), key=lambda one: one.utc)
