@@ -173,7 +173,14 @@ def run(arguments: list[str] | None = None) -> int:
     except OSError as wrong:
         if wrong.filename is None:
             raise
-        return _end(BadInput(wrong.strerror or str(wrong), place=str(wrong.filename)), 2)
+        return _end(
+            BadInput(
+                wrong.strerror or str(wrong),
+                place=str(wrong.filename),
+                remedy="Name a place that can be read and written",
+            ),
+            EXIT_BAD_INPUT,
+        )
     except MemoryError as wrong:
         return _end(
             BadInput(

@@ -1,6 +1,6 @@
 """Files of every kind, spoilt at random: is each read, or refused in words with its place?
 
-    python -m bench fuzz_files [--count 2000] [--seed 1] [--kind NAME] [--case N] [--page]
+    python -m bench fuzz_files [--count 2000] [--first 0] [--seed 1] [--kind NAME] [--case N]
 
 A whole file of every kind (bench/_fuzz_kinds.py) is spoilt (bench/_fuzz_mutations.py), and the verb
 that reads it is asked, in this process; one in two hundred through a process of its own. Found are
@@ -41,6 +41,7 @@ def judged(kind: Kind, done: Spoilt, asked: Asked) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=2000)
+    parser.add_argument("--first", type=int, default=0, help="number of the first case")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--kind", default="")
     parser.add_argument("--case", type=int)
@@ -59,7 +60,8 @@ def main() -> int:
             whole_file = asker.ask(kind, texts[kind.file].encode())
             if whole_file.code or whole_file.fault:
                 raise SystemExit(f"{kind.name} is refused as it stands: {whole_file}")
-        numbers = range(options.count) if options.case is None else [options.case]
+        last = options.first + options.count
+        numbers = range(options.first, last) if options.case is None else [options.case]
         for number in numbers:
             if time.monotonic() - begun > options.seconds:
                 break
@@ -85,7 +87,8 @@ def main() -> int:
     print(f"{ran} files, {sum(found.values())} findings; slowest {slowest[0]:.1f} s, {slowest[1]}")
     print(f"memory {asker.memory_mb():.0f} MB, {time.monotonic() - begun:.0f} s")
     if options.page:
-        what = f"fuzz_files --count {options.count} --seed {options.seed}"
+        first_case = f" --first {options.first}" if options.first else ""
+        what = f"fuzz_files --count {options.count}{first_case} --seed {options.seed}"
         refused = sum(n for (_, code), n in codes.items() if code == 2)
         says = f"{sum(found.values())} found; {refused} refused, the others read"
         memory = f"slowest {slowest[0]:.1f} s, {asker.memory_mb():.0f} MB"

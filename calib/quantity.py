@@ -23,7 +23,7 @@ UNITS = {
 }
 """Unit -> (base unit, factor)."""
 
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_NUMBER = r"[+-]?(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?"
 _QUANTITY = re.compile(rf"({_NUMBER})\s*(?:([A-Za-z]+)(?:\s*/\s*({_NUMBER})?\s*([A-Za-z]+))?)?")
 
 

@@ -10,9 +10,18 @@ from typing import Any
 from calib.errors import BadInput
 from calib.plain_text import plain
 
-_HEADER = re.compile(r"^\s*\[{1,2}\s*(.+?)\s*\]{1,2}\s*(#.*)?$")
+_PLAIN = r"[^\[\]\"'#]*+"
+_HEADER = re.compile(
+    rf"\s*+\[{{1,2}}({_PLAIN}(?:(?:\"[^\"]*+\"|'[^']*+'){_PLAIN})*+)\]{{1,2}}\s*+(?:#.*)?"
+)
 _KEY = re.compile(
     r"^\s*((?:[A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*')(?:\s*\.\s*(?:[A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*'))*)\s*="
+)
+MOST_LEVELS = 100
+"""Parts of a dotted key: the reader of TOML keeps every beginning of one."""
+_DEEP = re.compile(
+    r"(?<![\w.-])(?:(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"
+    rf"{{{MOST_LEVELS}}}"
 )
 _PART = re.compile(r"[A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*'")
 
@@ -46,7 +55,7 @@ def _lines(text: str) -> dict[tuple[str | int, ...], int]:
     table: tuple[str | int, ...] = ()
     arrays: Counter[tuple[str | int, ...]] = Counter()
     for number, line in enumerate(text.split("\n"), start=1):
-        if header := _HEADER.match(line):
+        if header := _HEADER.fullmatch(line):
             table = _parts(header.group(1))
             if line.lstrip().startswith("[["):
                 arrays[table] += 1
@@ -85,6 +94,12 @@ def load_toml(text: str, source: str) -> dict[str, Any]:
     if not text.strip():
         raise BadInput(
             "the file is empty", place=f"{source}, line 1", remedy="It begins with its format"
+        )
+    if deep := _DEEP.search(text):
+        raise BadInput(
+            f"a key of more than {MOST_LEVELS} parts",
+            place=f"{source}, line {text.count(chr(10), 0, deep.start()) + 1}",
+            remedy="Correct this line",
         )
     try:
         return tomllib.loads(text)

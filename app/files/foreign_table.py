@@ -238,7 +238,9 @@ def _decoded(path: Path, encoding: str) -> str:
         raw = path.read_bytes()
     except OSError as error:
         reason = "the file is missing" if isinstance(error, FileNotFoundError) else error.strerror
-        raise BadInput(reason or str(error), place=str(path)) from error
+        raise BadInput(
+            reason or str(error), place=str(path), remedy="Name a file that can be read"
+        ) from error
     if encoding == "utf-8" and raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise BadInput(
             "the file is UTF-16", place=f"{path}, line 1",
@@ -299,7 +301,9 @@ def _begin(lines: Sequence[str], layout: Layout, source: str) -> int:
     """How many lines come before the table."""
     if layout.skip > len(lines):
         raise BadInput(
-            f"the file has {len(lines)} lines, and {layout.skip} are to be skipped", place=source
+            f"the file has {len(lines)} lines, and {layout.skip} are to be skipped",
+            place=source,
+            remedy="Correct skip under [file] of the map",
         )
     if not layout.after:
         return layout.skip
@@ -354,7 +358,9 @@ def _with_header(
         units = [own or one for own, one in zip(_padded(units, len(stated)), stated, strict=False)]
     if not rows:
         raise BadInput(
-            "the file holds no row of the table", place=f"{source}, line {header_line + 1}"
+            "the file holds no row of the table",
+            place=f"{source}, line {header_line + 1}",
+            remedy="Check skip, after and end under [file] of the map",
         )
     width = layout.fields or (len(names) if layout.header else len(rows[0][1]))
     if width == 1 and layout.header and (other := _other_delimiter(names[0])):

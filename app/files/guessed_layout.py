@@ -49,11 +49,17 @@ def _text(path: Path) -> tuple[str, str]:
     try:
         raw = path.read_bytes()
     except OSError as error:
-        raise BadInput(error.strerror or str(error), place=str(path)) from error
+        raise BadInput(
+            error.strerror or str(error), place=str(path), remedy="Name a file that can be read"
+        ) from error
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return plain(raw.decode("utf-16", errors="replace")), "utf-16"
     if b"\x00" in raw:
-        raise BadInput("the file holds a zero byte: this is no text", place=str(path))
+        raise BadInput(
+            "the file holds a zero byte: this is no text",
+            place=str(path),
+            remedy="Save the table as text (CSV)",
+        )
     try:
         return plain(raw.decode("utf-8")), "utf-8"
     except UnicodeDecodeError:
@@ -100,7 +106,11 @@ def _first_row(lines: list[str], layout: Layout) -> int:
         len(_cells(line, layout)) for line in lines[:_MOST_LINES] if _numbers(line, layout) > 1
     )
     if not usual:
-        raise BadInput("no line of the file is a row of numbers", place="--guess")
+        raise BadInput(
+            "no line of the file is a row of numbers",
+            place="--guess",
+            remedy="Write a map by hand (docs/import.md)",
+        )
     width = usual.most_common(1)[0][0]
     for at, line in enumerate(lines):
         if not line.lstrip().startswith(layout.comments or ("\x00",)):

@@ -17,12 +17,16 @@ def read_text(path: Path) -> str:
     try:
         raw = path.read_bytes()
     except FileNotFoundError:
-        raise BadInput("the file is missing", place=str(path)) from None
+        raise BadInput(
+            "the file is missing", place=str(path), remedy="Check its name and folder"
+        ) from None
     except IsADirectoryError:
-        raise BadInput("this is a folder, not a file", place=str(path)) from None
+        raise BadInput(
+            "this is a folder, not a file", place=str(path), remedy="Name a file in it"
+        ) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise BadInput(reason, place=str(path)) from error
+        raise BadInput(reason, place=str(path), remedy="Name a file that can be read") from error
     try:
         return plain(raw.decode("utf-8"))
     except UnicodeDecodeError as error:

@@ -15,7 +15,7 @@ from app.files.text import read_text
 from calib.errors import BadInput
 from calib.quantity import LARGEST, UNITS, in_short, is_meant, is_quantity, quantity
 
-_HEAD = re.compile(r"(?P<name>[^\[\]()]*)(?:[\[(]\s*(?P<unit>[A-Za-z]+)\s*[\])])?\s*")
+_HEAD = re.compile(r"(?P<name>[^\[\]()]*+)(?:[\[(]\s*(?P<unit>[A-Za-z]+)\s*[\])])?\s*")
 
 
 @dataclass(frozen=True)

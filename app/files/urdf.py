@@ -13,6 +13,7 @@ import numpy as np
 from calib.arrays import Array
 from calib.errors import BadInput
 from calib.mechanism.rigid import from_euler
+from calib.quantity import LARGEST, in_short, is_meant
 
 MOVING = {"revolute": True, "continuous": True, "prismatic": False}
 """Kinds of joints that can be driven, and whether they turn."""
@@ -172,8 +173,12 @@ def _number(text: str, place: str) -> float:
         value = float(text)
     except ValueError:
         value = float("nan")
-    if not np.isfinite(value):
-        raise BadInput(f'"{text}" is not a finite number', place=place, remedy="Write a number")
+    if not is_meant(value):
+        raise BadInput(
+            f"{in_short(text)} is not a finite number that can be meant",
+            place=place,
+            remedy=f"Write a number within -{LARGEST:g} and {LARGEST:g}",
+        )
     return value
 
 

@@ -71,7 +71,11 @@ class History:
                     ),
                 )  # fmt: skip
         except (sqlite3.Error, OSError) as error:
-            raise BadInput(f"cannot write the history: {error}", place=str(self.file)) from error
+            raise BadInput(
+                f"cannot write the history: {error}",
+                place=str(self.file),
+                remedy="Make room, or let this user write there",
+            ) from error
 
     def entries(self, kind: Kind | None = None) -> list[Entry]:
         """Every entry, or those of a kind, the oldest first; raises BadInput for a broken file."""
@@ -85,7 +89,11 @@ class History:
                     (kind or "",),
                 ).fetchall()
         except sqlite3.Error as error:
-            raise BadInput(f"not a history ({error})", place=str(self.file)) from error
+            raise BadInput(
+                f"not a history ({error})",
+                place=str(self.file),
+                remedy="Move the file away: a new one is begun, sessions and runs stay",
+            ) from error
         return [
             Entry(what, utc, machine, serial, source, json.loads(said))
             for what, utc, machine, serial, source, said in rows

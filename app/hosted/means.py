@@ -126,7 +126,11 @@ class ByPoses:
     async def home(self, actuator: str) -> None:
         """Find the reference of every pose axis that has none: they may have one together."""
         if actuator not in [one.name for one in self._machine.actuators]:
-            raise Refused(f"there is no actuator {actuator}", device=self.device.identity.kind)
+            raise Refused(
+                f"there is no actuator {actuator}",
+                device=self.device.identity.kind,
+                remedy=f"Name one of {', '.join(one.name for one in self._machine.actuators)}",
+            )
         for name in [axis.name for axis in (await self.device.state()).actuators]:
             found = {axis.name: axis.homed for axis in (await self.device.state()).actuators}
             if not found[name]:

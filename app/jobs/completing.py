@@ -168,7 +168,11 @@ def _found(machine: Machine, every: Machine, errors: Sequence[Error]) -> Lacking
     poses = sample_poses(machine, POSES, np.random.default_rng(SEED))
     here = forward(every, poses.configuration.extension, every.nominal)
     if not here.converged.all():
-        raise BadInput("the machine does not close with errors put in", place=machine.source)
+        raise BadInput(
+            "the machine does not close with errors put in",
+            place=machine.source,
+            remedy="pkmcal machine check says how far it closes as it stands",
+        )
     twists = pose_jacobians(every, here).parameters * every.prior_sigma[:, None, None]
     twists[:, 3:] *= machine.size
     columns = twists.reshape(len(twists), -1)

@@ -195,7 +195,9 @@ def rendered(template: str, found: Corrected, place: str) -> str:
     except jinja2.TemplateSyntaxError as error:
         raise _fault(str(error.message), place, error.lineno) from error
     except _Refusal as error:
-        raise BadInput(str(error), place=place) from error
+        raise BadInput(
+            str(error), place=place, remedy="Export as json, or with a template of your own"
+        ) from error
     except (DeviceError, BadInput) as error:
         raise BadInput(error.what, place=place, remedy=error.remedy) from error
     except (jinja2.TemplateError, ArithmeticError, LookupError, TypeError, ValueError) as error:

@@ -199,7 +199,11 @@ def _header(
     parameters = {parameter.name for parameter in described.parameters}
     for name in head.controller_parameters:
         if name not in parameters:
-            raise BadInput(f"the machine has no parameter {name!r}", place=plan.source)
+            raise BadInput(
+                f"the machine has no parameter {name!r}",
+                place=plan.source,
+                remedy="pkmcal machine check lists them",
+            )
     return head, described, folder
 
 

@@ -67,4 +67,6 @@ def _fresh(root: Path, name: str) -> Path:
         except FileExistsError:
             continue
         return folder
-    raise BadInput("a hundred sessions in one second", place=str(root))
+    raise BadInput(
+        "a hundred sessions in one second", place=str(root), remedy="Begin the next one later"
+    )

@@ -69,13 +69,19 @@ class MockControl:
                 finally:
                     writer.close()
         except TimeoutError as error:
-            raise Silence(f'no answer to "{command}"', device=device) from error
+            raise Silence(
+                f'no answer to "{command}"', device=device, remedy="Is the mock still running?"
+            ) from error
         except OSError as error:
             raise ConnectFailed(
                 f"nobody answers ({error})", device=device, remedy="Is the mock still running?"
             ) from error
         if not line:
-            raise LinkLost(f'the link closed during "{command}"', device=device)
+            raise LinkLost(
+                f'the link closed during "{command}"',
+                device=device,
+                remedy="Is the mock still running?",
+            )
         answer: dict[str, Any] = json.loads(line)
         if not answer.get("ok", False):
             raise Refused(str(answer.get("error", answer)), device=device)

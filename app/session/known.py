@@ -66,7 +66,11 @@ class Snapshot:
             data["own"] = {str(k): str(v) for k, v in data.get("own", {}).items()}
             return Snapshot(**data)
         except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise BadInput(f"not a parameter snapshot ({error})", place=source) from error
+            raise BadInput(
+                f"not a parameter snapshot ({error})",
+                place=source,
+                remedy="It was edited or torn: move it away; pkmcal undo names the others",
+            ) from error
 
 
 class Snapshots:

@@ -146,7 +146,11 @@ def _nests(site: Site, options: PlanOptions) -> list[str]:
     """Platform nests that are used; raises BadInput for one that the site has not."""
     for nest in options.nests:
         if nest not in site.platform_nests:
-            raise BadInput(f'no platform nest "{nest}"', place=site.source)
+            raise BadInput(
+                f'no platform nest "{nest}"',
+                place=site.source,
+                remedy=f"Its nests are {', '.join(site.platform_nests)}",
+            )
     return list(options.nests or site.platform_nests)
 
 

@@ -53,7 +53,11 @@ class Automatic:
         journal = Decisions(folder)
         begun = journal.begun
         if begun is None:
-            raise BadInput("nothing was begun there", place=str(folder))
+            raise BadInput(
+                "nothing was begun there",
+                place=str(folder),
+                remedy="Name the folder of an earlier flight, or begin a new one",
+            )
         self.folder, self.journal, self.limits = folder, journal, Limits(**begun["limits"])
         self._desk.picture.revision += 1
 

@@ -67,7 +67,9 @@ def command(
 
     for name, value in (("--sigma-um", sigma_um), ("--near", near)):
         if not 0.0 < value < float("inf"):
-            raise BadInput(f"{value:g} is not larger than zero", place=name)
+            raise BadInput(
+                f"{value:g} is not larger than zero", place=name, remedy="Give a positive number"
+            )
     report = enter(
         run,
         poses,

@@ -128,7 +128,11 @@ def _sights(run: Run) -> Sights:
         cycle = int(number) if np.isfinite(number) else counted[label, nest]
         out.setdefault((label, cycle), {})[nest] = run.position[:, row]
     if not out:
-        raise BadInput("the run has no labelled readings on the platform", place=run.source)
+        raise BadInput(
+            "the run has no labelled readings on the platform",
+            place=run.source,
+            remedy="Fill in the column pose",
+        )
     return out
 
 
@@ -143,7 +147,11 @@ def _commands(machine: Machine, run: Run) -> dict[str, Poses]:
     found = forward(machine, machine.extension(q, held), machine.vector(held))
     if not np.all(found.converged):
         label = list(first)[int(np.argmin(found.converged))]
-        raise BadInput(f'the machine does not close at pose "{label}"', place=run.source)
+        raise BadInput(
+            f'the machine does not close at pose "{label}"',
+            place=run.source,
+            remedy="Check its q against the machine file",
+        )
     return {label: found.poses.take(np.array([k])) for k, label in enumerate(first)}
 
 

@@ -52,7 +52,9 @@ class Sights:
         if (self.pose_noise is None) != (self.nests.shape[1] > 0):
             raise BadInput("neither nests nor whole poses are read", remedy="Give one of the two.")
         if self.nests_free and self.pose_noise is not None:
-            raise BadInput("poses read whole have no nests that could be free")
+            raise BadInput(
+                "poses read whole have no nests that could be free", remedy="Leave nests_free out"
+            )
 
     @property
     def says(self) -> str:

@@ -145,7 +145,10 @@ def _sides(fit: Fit, effects: Sequence[Effect], rng: np.random.Generator) -> lis
         if effect.id in held:
             raise BadInput(f"{effect.id} is in the model already", remedy="Leave it out of --add")
         if reason := effect.unavailable(rows):
-            raise BadInput(f"{effect.id} cannot be told from anything here: {reason}")
+            raise BadInput(
+                f"{effect.id} cannot be told from anything here: {reason}",
+                remedy="Leave it out of --add",
+            )
     columns = effect_columns(fit, effects)
     problem = fit.problem
     offered = effect_candidates(fit, problem, columns)

@@ -66,7 +66,10 @@ def hold_out_of(
         if not told.any() or held.sum() == accepted.sum():
             continue
         own = jacobian[:, :, held]
-        inverse, slope = teach(held)
+        try:
+            inverse, slope = teach(held)
+        except np.linalg.LinAlgError:
+            continue  # the other poses alone leave something open: they predict nothing
         off = whitened[:, held] - np.tensordot(inverse @ slope, own, axes=1)
         squares += float(np.sum(rows.in_mm(off, held) ** 2))
         floor += noise_variance(fit, told)

@@ -91,7 +91,11 @@ class ChainReader:
             parts.append(("T", axes))
         starts = (found["start"] or "").split(",") if found["start"] else []
         if len(starts) > len(parts):
-            raise BadInput(f'"{token}" has too many starting values', place=self.place)
+            raise BadInput(
+                f'"{token}" has too many starting values',
+                place=self.place,
+                remedy=f"Give it {len(parts)}, apart by commas.",
+            )
         for k, (part, axis) in enumerate(parts):
             name = found["name"] or ""
             label = name if len(parts) == 1 or not name else f"{name}.{part}{axis}"

@@ -13,7 +13,7 @@ from calib.errors import BadInput
 from calib.mechanism.description import Term
 from calib.quantity import is_quantity, measured, product_unit
 
-_DIGITS = r"(?:\d+\.?\d*|\.\d+)"
+_DIGITS = r"(?:\d++\.?\d*+|\.\d++)"
 _FACTOR = rf"(?:{_DIGITS}[eE][+-]\d+[A-Za-z/]*|[^+\-*]+)"
 _PRODUCT = re.compile(rf"([+-]?)({_FACTOR}(?:\*{_FACTOR})*)")
 

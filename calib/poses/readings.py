@@ -99,9 +99,13 @@ class NestReadings:
 
     def __post_init__(self) -> None:
         if self.nests.ndim != 2 or self.nests.shape[0] != 3 or self.nests.shape[1] < 1:
-            raise BadInput(f"nests have the shape {self.nests.shape}, not (3, M)")
+            raise BadInput(
+                f"nests have the shape {self.nests.shape}", remedy="Give (3, M), M at least 1"
+            )
         if self.sigma <= 0.0:
-            raise BadInput("the uncertainty of a reading is not positive")
+            raise BadInput(
+                "the uncertainty of a reading is not positive", remedy="Give it in mm, above 0"
+            )
 
     @property
     def says(self) -> str:
@@ -151,7 +155,9 @@ class DirectionReadings:
 
     def __post_init__(self) -> None:
         if self.sigma <= 0.0:
-            raise BadInput("the uncertainty of a reading is not positive")
+            raise BadInput(
+                "the uncertainty of a reading is not positive", remedy="Give it in mm, above 0"
+            )
 
     @property
     def says(self) -> str:

@@ -1,6 +1,7 @@
 """Files of every kind that were spoilt, asked about as the operator would: a slice of the bench."""
 
 import random
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,10 +13,12 @@ from app.files.unit_columns import column
 from bench._fuzz_asking import Asker
 from bench._fuzz_kinds import KINDS, Kind, corpus
 from bench._fuzz_mutations import spoilt
-from bench.fuzz_files import judged
+from bench.fuzz_files import case, judged
 from calib.errors import BadInput
+from calib.mechanism.chain_value import read_value
 from calib.quantity import quantity
 from calib.runs.cells import channel_in, meant_in
+from calib.toml_place import load_toml
 from calib.toml_table import TomlTable
 
 
@@ -103,3 +106,40 @@ def test_a_run_of_two_poses_is_compared(asker: Asker) -> None:
     points = next(kind for kind in KINDS if kind.name == "points.csv")
     compared = Kind("few", points.file, ("compare", "run", "--json"))
     assert asker.ask(compared, few.encode()).fault == ""
+
+
+ONCE = {"run.toml": 6153, "machine, checked": 8530, "URDF": 11989, "poses": 2024}
+"""Cases of seed 12 that were found once: a fold without which a frame is open, a token without a
+remedy, an axis of 1e300, a key of 3,000 parts."""
+
+
+@pytest.mark.parametrize("name", ONCE)
+def test_what_was_found_once(name: str, asker: Asker) -> None:
+    kind = next(kind for kind in KINDS if kind.name == name)
+    done = case(kind, asker.text(kind.file), 12, ONCE[name])
+    assert judged(kind, done, asker.ask(kind, done.data)) == ""
+
+
+@pytest.mark.parametrize(
+    "key", ["a." * 30_000 + "a", '"a" . ' * 200 + "b", "[" + "x." * 300 + "y]"]
+)
+def test_a_key_of_thousands_of_parts_is_refused_before_it_takes_memory(key: str) -> None:
+    with pytest.raises(BadInput, match=r"f\.toml, line 2: a key of more than 100 parts"):
+        load_toml(f"a = 1\n{key} = 1\n", "f.toml")
+    assert load_toml("a.b.c.d = 1", "f") == {"a": {"b": {"c": {"d": 1}}}}
+    assert load_toml(f"t = 'x{'.x y' * 300}'", "f")["t"]
+
+
+def test_long_texts_take_no_time() -> None:
+    begun = time.process_time()
+    for text in ("1" * 20_000 + "[", "1" + " " * 20_000 + "!"):
+        with pytest.raises(BadInput):
+            quantity(text, "mm", "here")
+    with pytest.raises(BadInput):
+        read_value(
+            "1" * 20_000 + "]", "mm", "here", lambda name, place: quantity(name, "mm", place)
+        )
+    table = TomlTable.parse(f'a = """\n[{" " * 20_000}\n"""\nb = "x"\n', "f")
+    with pytest.raises(BadInput, match="line 4"):
+        table.number("b")
+    assert time.process_time() - begun < 2.0
