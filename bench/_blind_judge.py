@@ -87,7 +87,7 @@ def _likeness(stage: RunStage, signature: Vector, known: dict[str, int]) -> dict
     found = {}
     for name, index in known.items():
         unit = scores.of_units(index, left[:, None])[:, :, 0]
-        shares = np.einsum("tij,tj->ti", scores.weighings[index][0].whiten, unit)
+        shares = np.einsum("tij,tj->ti", scores.weighed.weighing(index, 0).whiten, unit)
         found[name] = float(np.sqrt(np.max(np.sum(shares**2, axis=1)) / norm))
     return found
 

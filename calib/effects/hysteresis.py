@@ -8,6 +8,7 @@ every move it is ``backlash`` of 2 h_i.
 """
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 
@@ -57,7 +58,7 @@ class Hysteresis(Effect):
         sizes = np.array([axis.lost_motion for axis in rows.machine.axes])
         scale = sizes / sizes[0]
         reach = float(values[-1]) * scale
-        behind, moved = _behind(rows.path, reach[:, None])
+        behind, moved = _behind(rows.path, tuple(map(float, reach)))
         behind, moved = behind[:, rows.at], moved[:, rows.at]
         shape = per_actuator(-behind / reach[:, None])
         by_reach = (-moved * reach[:, None] + behind) / reach[:, None] ** 2 * scale[:, None]
@@ -65,13 +66,18 @@ class Hysteresis(Effect):
         return Signature(extension=np.concatenate([shape, slope[None]]))
 
 
-def _behind(path: CommandedPath, reach: Array) -> tuple[Array, Array]:
-    """s - w at each row of the path, and its derivative by the reach, (n, M) both."""
+@lru_cache(maxsize=2 * TRIALS)
+def _behind(path: CommandedPath, reaches: tuple[float, ...]) -> tuple[Array, Array]:
+    """s - w at each row of the path, and its derivative by the reach, (n, M) both.
+
+    The same reaches are tried of the same path whatever else the model holds: they are kept.
+    """
     change, count = path.change, path.change.shape[0]
+    reach = np.array(reaches)
 
     def move(state: Array, row: int) -> Array:
         gone = state[:count] + change[:, row]
-        clipped = np.clip(gone, -reach[:, 0], reach[:, 0])
+        clipped = np.minimum(np.maximum(gone, -reach), reach)
         slope = np.where(gone == clipped, state[count:], np.sign(clipped))
         return np.concatenate([clipped, slope])
 

@@ -15,8 +15,9 @@ Where even the best explanation leaves more than the stated noise, sigmas are ta
 
 import numpy as np
 
-from calib.arrays import Array
+from calib.arrays import Array, IntArray
 from calib.evidence.scored import Scored
+from calib.evidence.weighing import Spectrum, spectrum_of
 
 TAUS = np.geomspace(1.0 / 30.0, 3.0, 7)
 """Multiples of the stated size over which the prior of an effect is averaged."""
@@ -50,27 +51,38 @@ def log_evidence(scores: Scored, index: int, residual_scores: Array) -> tuple[Ar
     """
     candidate = scores.candidates[index]
     hypotheses = candidate.hypotheses
-    parts = []
-    for number, subset in enumerate(hypotheses):
-        share = 1.0 if len(hypotheses) == 1 else 0.5
-        if number > 0:
-            share /= len(hypotheses) - 1
-        prior = np.log(share / len(candidate.trials))
-        parts.append(prior + _by_trial(scores, index, subset, residual_scores))
+    shares = np.full(len(hypotheses), 0.5 / max(len(hypotheses) - 1, 1))
+    shares[0] = 1.0 if len(hypotheses) == 1 else 0.5
+    priors = np.log(shares / len(candidate.trials))
+    found: dict[tuple[int, ...], Array] = {}
+    for chosen in candidate.by_count:
+        each = _by_trial(scores, index, chosen, residual_scores)
+        for subset, one in zip(chosen, each, strict=True):
+            found[tuple(map(int, subset))] = one
+    parts = [prior + found[subset] for prior, subset in zip(priors, hypotheses, strict=True)]
     total = np.logaddexp.reduce(np.concatenate(parts), axis=0)
     return np.asarray(total), parts
 
 
-def _by_trial(scores: Scored, index: int, subset: tuple[int, ...], residual_scores: Array) -> Array:
-    """Log Bayes factor (T, D) of one hypothesis, averaged over tau."""
-    chosen = np.array(subset, dtype=np.intp)
-    size = scores.norms[index][:, chosen] * scores.candidates[index].sizes[chosen] / scores.noise
-    weight = scores.weights[index][:, chosen[:, None], chosen]
-    values, vectors = np.linalg.eigh(weight * size[:, :, None] * size[:, None, :])
-    values = np.maximum(values, 0.0)
-    rotated = np.swapaxes(vectors, 1, 2) @ (size[:, :, None] * residual_scores[:, chosen])
-    grown = 1.0 + TAUS[:, None] ** 2 * values[:, None, :]
+def _by_trial(scores: Scored, index: int, chosen: IntArray, residual_scores: Array) -> Array:
+    """Log Bayes factors (H, T, D) of hypotheses (H, k), averaged over tau."""
+    spectrum = _spectrum(scores, index, chosen)
+    values = np.maximum(spectrum.values, 0.0) / scores.noise**2
+    size = spectrum.size / scores.noise
+    picked = residual_scores[:, chosen].swapaxes(0, 1)
+    rotated = np.swapaxes(spectrum.vectors, -1, -2) @ (size[..., None] * picked)
+    grown = 1.0 + TAUS[:, None] ** 2 * values[..., None, :]
     gain = 0.5 * (TAUS[:, None] ** 2 / grown) @ rotated**2
-    terms = gain - 0.5 * np.sum(np.log(grown), axis=2)[:, :, None]
-    top = terms.max(axis=1)
-    return np.asarray(top + np.log(np.mean(np.exp(terms - top[:, None]), axis=1)))
+    terms = gain - 0.5 * np.sum(np.log(grown), axis=-1)[..., None]
+    top = terms.max(axis=2)
+    return np.asarray(top + np.log(np.mean(np.exp(terms - top[:, :, None]), axis=2)))
+
+
+def _spectrum(scores: Scored, index: int, chosen: IntArray) -> Spectrum:
+    """Of hypotheses (H, k) at every trial, with the sizes that are usual."""
+    if chosen.shape == (1, len(scores.candidates[index].unknowns)):
+        whole = scores.weighed.spectrum(index)
+        return Spectrum(whole.size[None], whole.values[None], whole.vectors[None])
+    sizes = scores.norms[index] * scores.candidates[index].sizes
+    weight = scores.weights[index][:, chosen[:, :, None], chosen[:, None, :]]
+    return spectrum_of(weight.swapaxes(0, 1), sizes[:, chosen].swapaxes(0, 1))

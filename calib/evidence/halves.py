@@ -14,6 +14,7 @@ from calib.evidence.candidate import Candidate
 from calib.evidence.draws import squared
 from calib.evidence.problem import LinearProblem
 from calib.evidence.scored import Scored
+from calib.evidence.weighed import Weighed
 from calib.scaled import Scaled, normal_matrix
 
 
@@ -102,10 +103,8 @@ def halves_of(
                 scores[number][index][part] = found[:, :, number, None] / safe
     return [
         Half(
-            candidates=library,
-            norms=norms[number],
+            weighed=Weighed(library, norms[number], weights[number]),
             scores=scores[number],
-            weights=weights[number],
             squares=squared(residual[:, None]),
             trace=trace,
             whole=problem,
@@ -135,7 +134,12 @@ def all_joined(halves: Sequence[Half], joining: Sequence[tuple[Array, Array]]) -
                 )
                 scores[number][index][part, :, 0] = block @ half.residual / safe[:, :, 0]
     return [
-        replace(half, scores=scores[number], weights=weights[number], remembered={})
+        replace(
+            half,
+            weighed=Weighed(half.candidates, half.norms, weights[number]),
+            scores=scores[number],
+            remembered={},
+        )
         for number, (half, _) in enumerate(found)
     ]
 

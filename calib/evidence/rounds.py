@@ -98,7 +98,8 @@ def explore(
         best = next(index for index in judged.evidences if index in significant)
         chosen.append((best, judged.evidences[best]))
         columns, precision = joining(judged.scores, best)
-        rounds.append(_judge(judged.scores.without(columns, precision, rng), effects, quadratic))
+        larger = judged.scores.without(columns, precision, rng, best)
+        rounds.append(_judge(larger, effects, quadratic))
     return Exploration(tuple(rounds), tuple(chosen))
 
 

@@ -20,10 +20,8 @@ import numpy as np
 from calib.arrays import Array
 from calib.evidence.candidate import Candidate
 from calib.evidence.tails import log_any, log_tail, looks
-from calib.evidence.weighing import Stack, Weighing, chi_squares, soft_test, stacked
-
-EVEN = 0.9
-"""A group that is seen so evenly needs no test in which its directions weigh differently."""
+from calib.evidence.weighed import Weighed
+from calib.evidence.weighing import Stack, chi_squares
 
 
 @dataclass(eq=False, kw_only=True)
@@ -32,58 +30,37 @@ class Scored:
 
     Attributes
     ----------
-    candidates : sequence of Candidate
-    norms : list of (T, k)
-        Norm of each column before projection.
+    weighed : Weighed
+        Candidates, norms of their columns, and weights.
     scores : list of (T, k, 1 + draws)
         Unit columns times residuals.
-    weights : list of (T, k, k)
-        Unit columns times M times unit columns.
     squares : (1 + draws,)
         |e|^2 of every draw.
     trace : float
         tr M, the degrees of freedom left.
     """
 
-    candidates: Sequence[Candidate]
-    norms: list[Array]
+    weighed: Weighed
     scores: list[Array]
-    weights: list[Array]
     squares: Array
     trace: float
     remembered: dict[int, tuple[float, list[Array]]] = field(default_factory=dict, repr=False)
     """Evidence of the observation by candidate, kept by :mod:`calib.evidence.bayes`."""
 
-    @cached_property
-    def _stacks(self) -> list[list[Stack]]:
-        """For every candidate its hypotheses, those of equally many unknowns together."""
-        return [
-            [stacked(weight, chosen) for chosen in candidate.by_count]
-            for candidate, weight in zip(self.candidates, self.weights, strict=True)
-        ]
+    @property
+    def candidates(self) -> Sequence[Candidate]:
+        """What is asked."""
+        return self.weighed.candidates
 
-    @cached_property
-    def _softs(self) -> list[Stack | None]:
-        """For every candidate its soft test; None where the whole group is seen evenly."""
-        found: list[Stack | None] = []
-        for candidate, weight, norm, stacks in zip(
-            self.candidates, self.weights, self.norms, self._stacks, strict=True
-        ):
-            soft = (
-                soft_test(weight, norm * candidate.sizes) if len(candidate.unknowns) > 1 else None
-            )
-            even = soft is None or not np.any(soft.dof < EVEN * stacks[0].dof)
-            found.append(None if even else soft)
-        return found
+    @property
+    def norms(self) -> list[Array]:
+        """Norm of each column before projection, (T, k) of each candidate."""
+        return self.weighed.norms
 
-    @cached_property
-    def weighings(self) -> list[list[Weighing]]:
-        """For every candidate the whitening of each of its hypotheses."""
-        found = []
-        for candidate, stacks in zip(self.candidates, self._stacks, strict=True):
-            place = {one.subset: one for stack in stacks for one in stack.weighings()}
-            found.append([place[subset] for subset in candidate.hypotheses])
-        return found
+    @property
+    def weights(self) -> list[Array]:
+        """Unit columns times M times unit columns, (T, k, k) of each candidate."""
+        return self.weighed.weights
 
     @cached_property
     def _both(self) -> list[tuple[Array, Array | None]]:
@@ -119,22 +96,22 @@ class Scored:
 
     def _apart(self, index: int, scores: Array, squares: Array) -> tuple[Array, Array | None]:
         best = np.zeros(scores.shape[-1])
-        for stack in self._stacks[index]:
+        for stack in self.weighed.stacks[index]:
             best = np.maximum(best, self._largest(stack, scores, squares))
-        soft = self._softs[index]
+        soft = self.weighed.softs[index]
         return best, None if soft is None else self._largest(soft, scores, squares)
 
     def _largest(self, stack: Stack, scores: Array, squares: Array) -> Array:
-        """Largest -log p (D,) over the hypotheses of a stack and their trials."""
+        """Largest -log p (D,) over the hypotheses of a stack and their trials.
+
+        What is judged rises with the fall of chi-square: of equal degrees of freedom the largest
+        fall is the best.
+        """
         best = np.zeros(scores.shape[-1])
-        chi2, freedom = stack.chi_squares(scores), stack.dof.reshape(-1)
-        for dof in np.unique(freedom):
-            if dof == 0:
-                continue
-            here = chi2 if freedom.size == 1 else chi2[freedom == dof]
+        for dof, here in stack.largest(scores):
             left = (squares - here) / max(self.trace - dof, 1.0)
-            judged = (here / np.maximum(left, 1.0)).max(axis=0)
-            best = np.maximum(best, -log_tail(judged, float(dof)))
+            judged = here / np.maximum(left, 1.0)
+            best = np.maximum(best, -log_tail(judged, dof))
         return best
 
     @cached_property
@@ -144,7 +121,7 @@ class Scored:
         With more missing than one effect, what one leaves is noise to the comparison of two.
         """
         left = [float(self.squares[0]) / max(self.trace, 1.0)]
-        for scores, stacks in zip(self.scores, self._stacks, strict=True):
+        for scores, stacks in zip(self.scores, self.weighed.stacks, strict=True):
             for stack in stacks:
                 chi2 = stack.chi_squares(scores[:, :, :1])[:, 0]
                 dof = np.maximum(self.trace - stack.dof.reshape(-1), 1.0)
@@ -153,7 +130,7 @@ class Scored:
 
     def fall(self, index: int, number: int, trial: int) -> tuple[float, int]:
         """Fall of chi-square by a hypothesis in the observation, and its degrees of freedom."""
-        weighing = self.weighings[index][number]
+        weighing = self.weighed.weighing(index, number)
         seen = chi_squares(weighing, self.scores[index][:, :, :1])[trial, 0]
         return float(seen), int(weighing.dof[trial])
 

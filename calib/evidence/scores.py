@@ -6,7 +6,7 @@ not with their product. What scores say is :mod:`calib.evidence.scored`.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from calib.evidence.columns import Room
 from calib.evidence.draws import Residuals, residuals_of, squared
 from calib.evidence.problem import LinearProblem
 from calib.evidence.scored import Scored
+from calib.evidence.weighed import Weighed
 from calib.scaled import Scaled
 
 
@@ -32,6 +33,8 @@ class Scores(Scored):
 
     problem: LinearProblem
     residuals: Residuals
+    larger: "dict[int, _Larger]" = field(default_factory=dict, repr=False)
+    """Larger fits that were asked for, by the candidate that joined."""
 
     def of_units(self, index: int, matrix: Array) -> Array:
         """Unit columns of a candidate times a matrix (R, m): (T, k, m)."""
@@ -39,47 +42,93 @@ class Scores(Scored):
         parts = [_times(block, matrix, norm[part]) for part, block in columns.blocks()]
         return np.concatenate(parts)
 
-    def without(self, columns: Array, precision: Array, rng: np.random.Generator) -> "Scores":
+    def without(
+        self,
+        columns: Array,
+        precision: Array,
+        rng: np.random.Generator,
+        joining: int | None = None,
+    ) -> "Scores":
         """Scores after ``columns`` (k, R) with prior ``precision`` (k,) have joined the fit.
 
         With g = (A M A^T + Lambda)^-1/2 A M the larger fit has M' = M - g^T g and
         e' = e - g^T (A M A^T + Lambda)^-1/2 (A e + Lambda^1/2 xi), xi = 0 in the observation.
+
+        Of a candidate whose number is told in ``joining``, what does not hang on the null draws
+        is remembered for the same question of more draws.
         """
-        projected = self.problem.project(columns)
-        weight = columns @ projected.T + np.diag(precision)
-        scaled = Scaled.of(weight)
-        taken = scaled.half_solved(projected)
+        larger = self.larger.get(-1 if joining is None else joining)
+        if larger is None:
+            larger = self._larger(columns, precision)
+            if joining is not None:
+                self.larger[joining] = larger
         prior = np.sqrt(precision)[:, None] * rng.standard_normal(
             (precision.size, self.residuals.count)
         )
         prior[:, 0] = 0.0
-        pulled = scaled.half_solved(self.residuals.times(columns) + prior)
-        scores, weights = [], []
-        for index, old in enumerate(self.scores):
-            cross = self.of_units(index, taken.T)
-            scores.append(old - cross @ pulled)
-            weights.append(self.weights[index] - cross @ np.swapaxes(cross, 1, 2))
-        return _joined(
+        pulled = larger.scaled.half_solved(self.residuals.times(larger.columns) + prior)
+        residuals = self.residuals.without(larger.taken, pulled)
+        return Scores(
+            problem=larger.problem,
+            residuals=residuals,
+            weighed=larger.weighed,
+            scores=[
+                old - cross @ pulled for old, cross in zip(self.scores, larger.crosses, strict=True)
+            ],
+            squares=residuals.by_draw(squared),
+            trace=larger.problem.trace,
+            remembered=larger.remembered,
+            larger=larger.larger,
+        )
+
+    def _larger(self, columns: Array, precision: Array) -> "_Larger":
+        projected = self.problem.project(columns)
+        scaled = Scaled.of(columns @ projected.T + np.diag(precision))
+        taken = scaled.half_solved(projected)
+        crosses = [self.of_units(index, taken.T) for index in range(len(self.candidates))]
+        weights = [
+            weight - cross @ np.swapaxes(cross, 1, 2)
+            for weight, cross in zip(self.weights, crosses, strict=True)
+        ]
+        return _Larger(
+            columns,
+            scaled,
+            taken,
+            crosses,
             self.problem.with_columns(columns, precision),
-            self.residuals.without(taken, pulled),
-            self.candidates,
-            (self.norms, scores, weights),
+            Weighed(self.candidates, self.norms, weights),
         )
 
     def with_more(self, draws: int, rng: np.random.Generator) -> "Scores":
         """The same with so many null draws more."""
         more = residuals_of(self.problem, draws, rng)
         scores = _scores(self.candidates, more, self.norms)
-        scores = [
-            np.concatenate([old, new[:, :, 1:]], axis=2)
-            for old, new in zip(self.scores, scores, strict=True)
-        ]
-        return _joined(
-            self.problem,
-            self.residuals.joined(more),
-            self.candidates,
-            (self.norms, scores, self.weights),
+        return replace(
+            self,
+            residuals=self.residuals.joined(more),
+            scores=[
+                np.concatenate([old, new[:, :, 1:]], axis=2)
+                for old, new in zip(self.scores, scores, strict=True)
+            ],
+            squares=np.concatenate([self.squares, more.by_draw(squared)[1:]]),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class _Larger:
+    """A fit that some columns (k, R) have joined, with what the observation says of it.
+
+    ``taken`` (k, R) is g, ``crosses`` are unit columns of every candidate times it, (T, k', k).
+    """
+
+    columns: Array
+    scaled: Scaled
+    taken: Array
+    crosses: list[Array]
+    problem: LinearProblem
+    weighed: Weighed
+    remembered: dict[int, tuple[float, list[Array]]] = field(default_factory=dict)
+    larger: "dict[int, _Larger]" = field(default_factory=dict)
 
 
 def score(
@@ -96,24 +145,11 @@ def score(
         norms[index][part], weights[index][part] = _weighed(problem, block)
 
     scores = _scores(candidates, residuals, norms, weigh)
-    return _joined(problem, residuals, candidates, (norms, scores, weights))
-
-
-def _joined(
-    problem: LinearProblem,
-    residuals: Residuals,
-    candidates: Sequence[Candidate],
-    numbers: tuple[list[Array], list[Array], list[Array]],
-) -> Scores:
-    """Scores from norms, scores and weights of all candidates."""
-    norms, scores, weights = numbers
     return Scores(
         problem=problem,
         residuals=residuals,
-        candidates=candidates,
-        norms=norms,
+        weighed=Weighed(candidates, norms, weights),
         scores=scores,
-        weights=weights,
         squares=residuals.by_draw(squared),
         trace=problem.trace,
     )

@@ -162,10 +162,13 @@ def _periodic(variable: Variable, response: Response) -> Candidate:
     most = max(MOST_PERIODS, min(variable.most_periods, fitting))
     frequencies = _frequencies(span, shortest, most)
 
+    own = np.atleast_2d(variable.values) - values.min()
+
     def waves(frequency: Array) -> Array:
-        phase = 2.0 * np.pi * frequency[:, None, None] * (values - values.min())
-        shapes = np.concatenate([np.sin(phase), np.cos(phase)], axis=1)
-        return np.asarray(shapes * np.concatenate([response.columns, response.columns]))
+        phase = 2.0 * np.pi * frequency[:, None, None] * own
+        shapes = np.stack([np.sin(phase), np.cos(phase)], axis=1)
+        made = shapes * response.columns
+        return np.asarray(made.reshape(frequency.size, -1, made.shape[-1]))
 
     count = response.columns.shape[0]
     columns = Columns(

@@ -64,8 +64,17 @@ def looks(levels: Array, quantile: float = 0.9) -> float:
 
     n such that P(max < level) = (1 - e^-level)^n at the given quantile; at least one.
     """
-    log_p = -float(np.quantile(levels, quantile))
+    log_p = -quantile_of(levels, quantile)
     p = float(np.exp(max(log_p, np.log(SMALLEST))))
     if p >= 1.0:
         return 1.0
     return max(1.0, float(np.log(quantile) / np.log1p(-p)))
+
+
+def quantile_of(values: Array, quantile: float) -> float:
+    """numpy's quantile of (n,), interpolated, in a tenth of the time: thousands are asked for."""
+    place = quantile * (values.size - 1)
+    at = min(int(place), max(values.size - 2, 0))
+    both = np.partition(values, (at, min(at + 1, values.size - 1)))
+    low, high, part = float(both[at]), float(both[min(at + 1, values.size - 1)]), place - at
+    return high - (high - low) * (1.0 - part) if part >= 0.5 else low + (high - low) * part

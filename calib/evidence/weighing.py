@@ -5,11 +5,13 @@ is the fall of chi-square if the hypothesis joined the fit. Hypotheses of equall
 whitened together, over all trials at once.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from calib.arrays import Array, IntArray
+from calib.arrays import Array, BoolArray, IntArray
 
 BLIND = 1e-8
 """Directions of which less than this (squared norm after / before projection) is left are lost."""
@@ -48,12 +50,25 @@ class Stack:
             squared = np.einsum("htkd,htkd->htd", whitened, whitened)
         return np.asarray(squared.reshape(-1, scores.shape[2]))
 
-    def weighings(self) -> list[Weighing]:
-        """One for each hypothesis."""
-        return [
-            Weighing(tuple(map(int, subset)), whiten, dof)
-            for subset, whiten, dof in zip(self.chosen, self.whiten, self.dof, strict=True)
-        ]
+    def largest(self, scores: Array) -> Iterator[tuple[float, Array]]:
+        """Largest fall (D,) over hypotheses and trials of equal degrees of freedom, with these."""
+        if self._freedoms:
+            chi2 = self.chi_squares(scores)
+            for dof, which in self._freedoms:
+                yield dof, (chi2 if which is None else chi2[which]).max(axis=0)
+
+    @cached_property
+    def _freedoms(self) -> list[tuple[float, BoolArray | None]]:
+        """Degrees of freedom, and which rows of :meth:`chi_squares` have them; None for all."""
+        freedom = self.dof.reshape(-1)
+        each = [float(dof) for dof in np.unique(freedom)]
+        if len(each) == 1:
+            return [(each[0], None)] if each[0] else []
+        return [(dof, freedom == dof) for dof in each if dof]
+
+    def weighing(self, row: int) -> Weighing:
+        """One of the hypotheses."""
+        return Weighing(tuple(map(int, self.chosen[row])), self.whiten[row], self.dof[row])
 
 
 def stacked(weight: Array, chosen: IntArray) -> Stack:
@@ -83,22 +98,43 @@ def _triangular(blocks: Array) -> Array | None:
     return np.linalg.inv(factors) if smallest**2 > WELL_SEEN else None
 
 
-def soft_test(weight: Array, size: Array) -> Stack:
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Unknowns of standard deviation ``size`` (..., k) = D: D V D in its eigenvectors.
+
+    ``values`` (..., k), ascending, are the variances that the readings see; ``vectors``
+    (..., k, k) in columns.
+    """
+
+    size: Array
+    values: Array
+    vectors: Array
+
+
+def spectrum_of(weight: Array, size: Array) -> Spectrum:
+    """Spectrum of weights (..., k, k) and sizes (..., k)."""
+    scaled = weight * size[..., :, None] * size[..., None, :]
+    if size.shape[-1] == 1:
+        return Spectrum(size, scaled[..., 0], np.ones_like(scaled))
+    return Spectrum(size, *np.linalg.eigh(scaled))
+
+
+def soft_test(spectrum: Spectrum) -> Stack:
     """The whole group, each direction weighed by how far its unknowns would move the readings.
 
-    With unknowns of standard deviation ``size`` (T, k) the readings see variances v, the
-    eigenvalues of D V D; the most powerful test for such a group is sum w a^2, w = v / (1 + v).
-    Under the null that is near to g times a chi-square with h degrees of freedom, g = sum w^2 /
-    sum w, h = (sum w)^2 / sum w^2 (Satterthwaite 1946); it is divided by g here, and ``dof`` is h.
+    The readings see variances v, the eigenvalues of D V D; the most powerful test for such a group
+    is sum w a^2, w = v / (1 + v). Under the null that is near to g times a chi-square with h
+    degrees of freedom, g = sum w^2 / sum w, h = (sum w)^2 / sum w^2 (Satterthwaite 1946); it is
+    divided by g here, and ``dof`` is h.
     """
-    values, vectors = np.linalg.eigh(weight * size[:, :, None] * size[:, None, :])
+    size, values, vectors = spectrum.size, spectrum.values, spectrum.vectors
     seen = values > BLIND * np.maximum(values[:, -1:], 1e-300)
     known = np.where(seen, values, 1.0)
     worth = np.where(seen, known / (1.0 + known), 0.0)
     total, squared = worth.sum(axis=1), np.maximum(np.sum(worth**2, axis=1), 1e-300)
     scale = np.sqrt(worth * (total / squared)[:, None] / known)
     whiten = np.swapaxes(vectors * size[:, :, None], 1, 2) * scale[:, :, None]
-    whole = np.arange(weight.shape[1], dtype=np.intp)[None]
+    whole = np.arange(size.shape[1], dtype=np.intp)[None]
     return Stack(whole, whiten[None], np.round(4.0 * total**2 / squared)[None] / 4.0)
 
 

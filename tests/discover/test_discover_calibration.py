@@ -208,7 +208,7 @@ def test_directions_that_hardly_move_the_readings_cost_nothing():
     hidden = 3.0 * columns[0] * 9.0 / np.linalg.norm(lab.fitted(0.0, rng).project(columns[0]))
     one = lab.effect("one", columns[:1])
     found = diagnose(lab.fitted(hidden / 6.0, rng), [crowd, one], rng=rng, draws=199)
-    (whole,) = found.scores.weighings[0]
+    whole = found.scores.weighed.weighing(0, 0)
     fall = chi_squares(whole, found.scores.scores[0][:, :, :1])[0, 0]
     blunt = -log_tail(np.array([fall]), int(whole.dof[0]))[0]
     crowded, alone = (level[0] for level in found.scores.levels)
