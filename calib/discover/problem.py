@@ -37,7 +37,9 @@ def _candidate(fit: Fit, problem: LinearProblem, one: EffectColumns) -> Candidat
     linear = tuple(unknown for unknown in one.unknowns if not unknown.nonlinear)
 
     def make(first: int, last: int) -> Array:
-        made = np.stack([fit.whiten(one.at(trial)) for trial in range(first, last)])
+        derived = one.some(first, last)
+        flat = fit.whiten(derived.reshape(-1, *derived.shape[2:]))
+        made = flat.reshape(*derived.shape[:2], -1)
         return made if replaced is None else replaced(made)
 
     columns = Columns((len(one.trials), len(linear), 3 * fit.readings), make)

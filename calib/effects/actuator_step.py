@@ -6,12 +6,12 @@ The moment is searched between the stops of the machine. Several runs stand one 
 the clock of t0; homing before the next one brings the actuator back.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation, alone, per_actuator
+from calib.effects.component import Effect, Scan, Signature, Situation, alone, per_actuator
 from calib.effects.run_clock import about, between, from_then_on, run_starts, spread
 from calib.runs.stack import Rows
 from calib.unknown import Unknown
@@ -57,6 +57,15 @@ class ActuatorStep(Effect):
         every = _every_moment(rows)
         for moment in about(spread(every), every, trial[0]):
             yield (float(moment),)
+
+    def scan(self, situation: Situation, trials: Sequence[tuple[float, ...]]) -> Scan | None:
+        """One from every moment on."""
+        rows = situation.rows
+        return Scan(
+            (Signature(extension=per_actuator(np.ones_like(rows.extension))),),
+            np.zeros(len(trials), dtype=np.intp),
+            np.array([[from_then_on(rows, rows.time_s, moment)] for (moment,) in trials], float),
+        )
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """One from the moment on, in its run; the moment itself does not move."""

@@ -147,6 +147,24 @@ class Signature:
     """(U, 6, N), base axes, velocity of the platform's origin first"""
 
 
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """Signatures of k linear unknowns at T trials that differ by a factor of each reading alone.
+
+    Attributes
+    ----------
+    steady : tuple of Signature
+        Of the k unknowns; what the trials have in common.
+    which : (T,)
+        Which of them each trial goes by.
+    factors : (T, k, N) or (T, 1, N)
+    """
+
+    steady: tuple[Signature, ...]
+    which: IntArray
+    factors: Array
+
+
 class Effect(ABC):
     """A physical effect that the plain geometric model misses.
 
@@ -224,6 +242,13 @@ class Effect(ABC):
     def refined(self, rows: Rows, trial: tuple[float, ...]) -> Iterator[tuple[float, ...]]:
         """Values closer about the best trial, for unknowns that the fit cannot move itself."""
         yield trial
+
+    def scan(self, situation: Situation, trials: Sequence[tuple[float, ...]]) -> Scan | None:
+        """All :attr:`trials` at once, the effect doing nothing yet; None: signature by signature.
+
+        For effects with many trials, as it is many times as fast.
+        """
+        return None
 
     @abstractmethod
     def signature(self, situation: Situation, values: Array) -> Signature:

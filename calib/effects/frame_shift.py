@@ -5,12 +5,12 @@ the tracker frame (base or tracker touched). The moment is searched between the 
 runs stand one after the other on its clock; a run begins with nests and frames as they then are.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Signature, Situation
+from calib.effects.component import Effect, Scan, Signature, Situation
 from calib.effects.run_clock import about, between, from_then_on, run_starts, spread
 from calib.effects.tracker import rigid_motions
 from calib.mechanism.rigid import cross, rotate
@@ -56,6 +56,19 @@ class FrameShift(Effect):
         for moment in about(tried, _between(rows, rows.moment), trial[0]):
             yield (float(moment), trial[1])
 
+    def scan(self, situation: Situation, trials: Sequence[tuple[float, ...]]) -> Scan | None:
+        """Rigid motions of the platform's nests, and of the base, from every moment on."""
+        rows = situation.rows
+        still = np.zeros(3)
+        return Scan(
+            (
+                Signature(nest=_motions(rows.nest, still) * rows.on_platform),
+                Signature(point=_of_base(situation, still)),
+            ),
+            np.array([where > 0.5 for _, where in trials], dtype=np.intp),
+            np.array([[from_then_on(rows, rows.moment, moment)] for moment, _ in trials], float),
+        )
+
     def signature(self, situation: Situation, values: Array) -> Signature:
         """A rigid motion of everything read after the moment."""
         rows = situation.rows
@@ -63,9 +76,7 @@ class FrameShift(Effect):
         after = from_then_on(rows, rows.moment, float(moment)).astype(np.float64)
         shape = np.zeros((8, 3, rows.count))
         if where > 0.5:
-            motions = _motions(situation.base_point, values[3:6])
-            turned = [rotate(situation.frame_rotation, one) for one in motions]
-            shape[:6] = np.stack(turned) * after
+            shape[:6] = _of_base(situation, values[3:6]) * after
             return Signature(point=shape)
         shape[:6] = _motions(rows.nest, values[3:6]) * after * rows.on_platform
         return Signature(nest=shape)
@@ -87,6 +98,12 @@ def _motions(point: Array, turn: Array) -> Array:
     motions = rigid_motions(point + first * once + second * cross(w, once))
     motions[:3] = rigid_motions(point)[:3]
     return motions
+
+
+def _of_base(situation: Situation, turn: Array) -> Array:
+    """Unit motions (6, 3, N) of the base frame, in the tracker frame."""
+    motions = _motions(situation.base_point, turn)
+    return np.stack([rotate(situation.frame_rotation, one) for one in motions])
 
 
 def _every_moment(rows: Rows) -> Array:

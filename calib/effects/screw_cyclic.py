@@ -6,12 +6,12 @@ actuators of one unit: where linear and rotary ones are mixed, ``screw-cyclic`` 
 linear ones and ``encoder-cyclic`` that of the rotary ones.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from calib.arrays import Array, IntArray
-from calib.effects.component import Effect, Signature, Situation, alone
+from calib.effects.component import Effect, Scan, Signature, Situation, alone, per_actuator
 from calib.mechanism.axes import units_of
 from calib.mechanism.description import Machine
 from calib.runs.stack import Rows
@@ -61,6 +61,21 @@ class ScrewCyclic(Effect):
         count = int(np.ceil((high - low) * span * OVERSAMPLING)) + 1
         for frequency in np.linspace(low, high, max(count, 2)):
             yield (1.0 / float(frequency),)
+
+    def scan(self, situation: Situation, trials: Sequence[tuple[float, ...]]) -> Scan | None:
+        """Sines and cosines of every trial's period."""
+        if self._given_period(situation.machine) is not None:
+            return None
+        which, s = self.axes(situation.machine), situation.rows.extension
+        periods = np.array(trials)[:, 0, None, None]
+        phase = 2.0 * np.pi * s[which] / periods
+        factors = np.stack([np.sin(phase), np.cos(phase)], axis=2)
+        moved = np.repeat(per_actuator(np.ones_like(s))[which], 2, axis=0)
+        return Scan(
+            (Signature(extension=moved),),
+            np.zeros(len(trials), dtype=np.intp),
+            factors.reshape(len(trials), -1, s.shape[1]),
+        )
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """Sine and cosine, and the derivative by the period."""

@@ -3,8 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from calib.arrays import Array, BoolArray
-from calib.effects.component import Effect, Situation
+from calib.effects.component import Effect, Scan, Situation
 from calib.identify.fitting import Fit
 from calib.model.columns import at_trial, channels_known, whitened_columns
 from calib.unknown import Unknown, linear_among
@@ -28,6 +30,20 @@ class EffectColumns:
     def linear(self) -> BoolArray:
         """Which of the unknowns are linear."""
         return linear_among(self.unknowns)
+
+    def some(self, first: int, last: int) -> Array:
+        """Derivatives (t, k, 3, N) at the trials first .. last - 1, counted from 0."""
+        scan = self.effect.scan(self.situation, self.trials[first:last])
+        if scan is None:
+            return np.stack([self.at(trial) for trial in range(first, last)])
+        steady = self._steady(scan)
+        columns = steady[scan.which] if len(steady) > 1 else steady
+        made: Array = columns * scan.factors[:, :, None, :]
+        return made if self.known.all() else made * self.known
+
+    def _steady(self, scan: Scan) -> Array:
+        """Whitened derivatives (s, k, 3, N) of what the trials of a scan have in common."""
+        return np.stack([whitened_columns(one, self.situation) for one in scan.steady])
 
     def at(self, trial: int) -> Array:
         """Derivatives (k, 3, N) at one of the trials, counted from 0."""
