@@ -40,7 +40,7 @@ def simulate_prototype(
     if asked:
         raise BadInput(
             f"--{asked[0]} needs the physics of a mock machine, {name} is a virtual prototype",
-            remedy="Leave it out, or simulate hexapod, tripod or ptm",
+            remedy="Leave it out, or simulate hexapod, tripod, ptm or an arm that turns",
         )
     noise = NOISE_UM if options["noise_um"] is None else float(options["noise_um"])
     if noise <= 0.0 or options["cycles"] < 1:

@@ -1,11 +1,11 @@
-"""URDF, the description of robots that ROS and simulators read: serial chains, in and out.
+"""URDF, the description of robots that ROS and simulators read, in and out.
 
 In it lengths are m and angles rad; a joint's frame is given in its parent's by xyz and rpy with
 R = Rz(yaw) Ry(pitch) Rx(roll), and the joint turns about, or slides along, an axis of that frame.
 """
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -39,11 +39,23 @@ class UrdfJoint:
 
 
 @dataclass(frozen=True, eq=False)
+class UrdfMass:
+    """A link's mass, kg, and its centre (3,), m, in the frame of the moving joint before it."""
+
+    link: str
+    joint: str
+    kg: float
+    centre: Array
+
+
+@dataclass(frozen=True, eq=False)
 class UrdfArm:
-    """The joints from a base link to a tip link, in order."""
+    """The joints from a base link to a tip link, in order; what links weigh, gears by joint."""
 
     name: str
     joints: tuple[UrdfJoint, ...]
+    masses: tuple[UrdfMass, ...] = ()
+    gears: Mapping[str, float] = field(default_factory=dict)
 
 
 def read_urdf(text: str, source: str, base: str = "", tip: str = "") -> UrdfArm:
@@ -54,6 +66,45 @@ def read_urdf(text: str, source: str, base: str = "", tip: str = "") -> UrdfArm:
     BadInput
         For what is no URDF, a link that is not there, several ends, a joint that no chain can hold.
     """
+    root = xml_of(text, source)
+    name, joints, by_child = read_tree(root, source)
+    tip = tip or _only_end(joints, by_child, source)
+    chain = chain_of(by_child, joints, base, tip, source)
+    return UrdfArm(name, tuple(chain), tuple(_masses(root, chain, source)), _gears(root, source))
+
+
+def _masses(root: ET.Element, chain: list[UrdfJoint], source: str) -> Iterator[UrdfMass]:
+    """What is inertial of the links of a chain behind its first moving joint."""
+    links = {one.get("name", ""): one.find("inertial") for one in root.findall("link")}
+    moving, frame = "", np.eye(4)
+    for one in chain:
+        moves = one.kind in MOVING
+        moving, frame = (
+            (one.name, np.eye(4)) if moves else (moving, frame @ transform(one.xyz, one.rpy))
+        )
+        inertial = links.get(one.child)
+        if inertial is None or not moving:
+            continue
+        place = f'{source}, link "{one.child}"'
+        kg = _number(_child(inertial, "mass").get("value", "0"), place)
+        centre = numbers_of(_child(inertial, "origin").get("xyz", "0 0 0"), 3, place)
+        if kg > 0.0:
+            yield UrdfMass(one.child, moving, kg, (frame @ np.append(centre, 1.0))[:3])
+
+
+def _gears(root: ET.Element, source: str) -> dict[str, float]:
+    """Turns of the motor for one of the joint, where a transmission says."""
+    found: dict[str, float] = {}
+    for one in root.findall("transmission"):
+        reduction = next(iter(one.iter("mechanicalReduction")), None)
+        if reduction is not None:
+            value = abs(_number(reduction.text or "", f"{source}, transmission"))
+            found |= {joint.get("name", ""): value for joint in one.iter("joint") if value > 1.0}
+    return found
+
+
+def xml_of(text: str, source: str) -> ET.Element:
+    """The root of a URDF; raises BadInput for what is none."""
     try:
         root = ET.fromstring(text)
     except ET.ParseError as error:
@@ -62,6 +113,11 @@ def read_urdf(text: str, source: str, base: str = "", tip: str = "") -> UrdfArm:
         ) from error
     if root.tag != "robot":
         raise BadInput(f"<{root.tag}> is no robot", place=source, remedy="Name a URDF file")
+    return root
+
+
+def read_tree(root: ET.Element, source: str) -> tuple[str, list[UrdfJoint], dict[str, UrdfJoint]]:
+    """Name, joints, and the joint of each link to its parent."""
     joints = [_joint(one, source) for one in root.findall("joint")]
     if not joints:
         raise BadInput("it has no joint", place=source, remedy="Name the URDF of a robot")
@@ -69,15 +125,17 @@ def read_urdf(text: str, source: str, base: str = "", tip: str = "") -> UrdfArm:
     if len(by_child) < len(joints):
         twice = next(o.child for o in joints if [j.child for j in joints].count(o.child) > 1)
         raise BadInput(
-            f'link "{twice}" has two parents', place=source, remedy="URDF is a tree: cut the loop"
+            f'link "{twice}" has two parents',
+            place=source,
+            remedy="URDF is a tree: cut the loop, and list it (--loops FILE)",
         )
-    tip = tip or _only_end(joints, by_child, source)
-    return UrdfArm(root.get("name", "arm"), tuple(_chain(by_child, joints, base, tip, source)))
+    return root.get("name", "arm"), joints, by_child
 
 
-def _chain(
+def chain_of(
     by_child: dict[str, UrdfJoint], joints: list[UrdfJoint], base: str, tip: str, source: str
 ) -> list[UrdfJoint]:
+    """Joints from one link to another, or from the root; raises BadInput where there is no way."""
     links = {one.parent for one in joints} | set(by_child)
     for name in (base, tip):
         if name and name not in links:
@@ -136,7 +194,7 @@ def _joint(node: ET.Element, source: str) -> UrdfJoint:
     if not all(links.values()):
         raise BadInput("it has no parent or no child", place=place, remedy="Name both links")
     origin, mimic, limit = _child(node, "origin"), node.find("mimic"), node.find("limit")
-    axis = _numbers(_child(node, "axis").get("xyz", "1 0 0"), place)
+    axis = numbers_of(_child(node, "axis").get("xyz", "1 0 0"), 3, place)
     if kind in MOVING and not np.linalg.norm(axis) > 0.0:
         raise BadInput("its axis has no direction", place=place, remedy='Write <axis xyz="0 0 1"/>')
     limits = None
@@ -155,8 +213,8 @@ def _joint(node: ET.Element, source: str) -> UrdfJoint:
         kind,
         links["parent"],
         links["child"],
-        _numbers(origin.get("xyz", "0 0 0"), place),
-        _numbers(origin.get("rpy", "0 0 0"), place),
+        numbers_of(origin.get("xyz", "0 0 0"), 3, place),
+        numbers_of(origin.get("rpy", "0 0 0"), 3, place),
         axis / max(float(np.linalg.norm(axis)), 1e-300),
         limits,
         follows,
@@ -182,10 +240,14 @@ def _number(text: str, place: str) -> float:
     return value
 
 
-def _numbers(text: str, place: str) -> Array:
+def numbers_of(text: str, count: int, place: str) -> Array:
+    """Finite numbers (count,) of an attribute; raises BadInput naming ``place``."""
     values = [_number(word, place) for word in text.split()]
-    if len(values) != 3:
-        raise BadInput(f'"{text}" is not three numbers', place=place, remedy="Write x y z")
+    if len(values) != count:
+        what = "three numbers" if count == 3 else "a number"
+        raise BadInput(
+            f'"{text}" is not {what}', place=place, remedy="Write x y z" if count == 3 else ""
+        )
     return np.array(values)
 
 
@@ -209,15 +271,15 @@ def angles_of(rotation: Array) -> Array:
     return np.array([float(np.arctan2(rest[2, 1], rest[2, 2])), pitch, yaw])
 
 
-def urdf_text(arm: UrdfArm, remark: str) -> str:
-    """A URDF of the joints of an arm: links without shape or mass."""
+def urdf_text(arm: UrdfArm, remark: str, more: Iterable[str] = ()) -> str:
+    """A URDF of joints: links without shape or mass; ``more`` lines of XML at its end."""
     lines = ['<?xml version="1.0"?>', f"<!-- {remark.replace('--', '- -')} -->"]
     lines.append(f'<robot name="{arm.name}">')
     links = dict.fromkeys(link for one in arm.joints for link in (one.parent, one.child))
     lines += [f'  <link name="{link}"/>' for link in links]
     for one in arm.joints:
         lines += _written(one)
-    return "\n".join([*lines, "</robot>", ""])
+    return "\n".join([*lines, *more, "</robot>", ""])
 
 
 def _written(one: UrdfJoint) -> Iterator[str]:

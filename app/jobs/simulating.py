@@ -1,5 +1,6 @@
 """Simulate a measuring run, with noise and, if wanted, something wrong with the machine."""
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,16 +8,20 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from app.files.machines import load_machine, shipped_machines
 from app.files.poses import read_any_poses
 from app.files.runs import HEADER, POINTS
 from app.jobs.chosen_runs import File, path_of
 from app.jobs.record import Report
-from app.prototype import simulate_prototype
+from app.prototype import ONLY_MOCKS, simulate_prototype
 from calib.errors import BadInput
+from calib.mechanism.description import Machine
 from calib.mechanism.rigid import Poses
 from calib.mechanism.task import task_values
 from mocks.hidden.table import Hidden
+from mocks.physics.arm_body import ArmBody, is_arm
 from mocks.physics.bodies import BODIES, body_named
+from mocks.physics.body import Body
 from mocks.physics.truth import read_parameters
 from mocks.simulate import Profile, RunPlan, SimulatedRun
 from mocks.simulate import simulate as simulate_run
@@ -60,9 +65,9 @@ def simulate(
     """Write a simulated run of a machine, and apart from it the truth.
 
     For the hexapod, the tripod and the ptm the physics is that of the mock machines and shares
-    nothing with the model that is fitted. Any other machine is a virtual prototype: errors within
-    its tolerances, without hidden effects. The same seed gives the same run; changing the noise
-    changes nothing else.
+    nothing with the model that is fitted; so it is for arms, as soon as something is to be hidden.
+    Any other machine is a virtual prototype: errors within its tolerances, without hidden effects.
+    The same seed gives the same run; changing the noise changes nothing else.
 
     Parameters
     ----------
@@ -120,23 +125,25 @@ def simulate(
         "seed": seed, "noise_um": noise_um, "cycles": cycles, "order": order, "delays": delays,
         "strays": strays, "title": title,
     }  # fmt: skip
-    if machine not in BODIES:
-        asked = {
-            **options, "poses": str(poses), "hidden": hidden, "parameters": parameters,
-            "controller": controller, "payload": tuple(payload), "effect": tuple(effects or ()),
-        }  # fmt: skip
+    asked = {
+        **options, "poses": str(poses), "hidden": hidden, "parameters": parameters,
+        "controller": controller, "payload": tuple(payload), "effect": tuple(effects or ()),
+    }  # fmt: skip
+    body = _body(machine, asked)
+    if body is None:
         return SimulationReport.of(simulate_prototype(machine, out, place, asked))
     if noise_um is not None and noise_um <= 0.0:
         raise BadInput(f"--noise-um must be positive, got {noise_um}", remedy="Correct the options")
     if cycles < 1:
         raise BadInput(f"--cycles must be at least 1, got {cycles}", remedy="Correct the options")
-    described = body_named(machine).machine
+    described = body.machine
     try:
         known = {} if hidden is None else dict(Hidden.read(Path(hidden)).values)
         plan = RunPlan(
-            machine=machine,
+            machine=machine if machine in shipped_machines() else os.path.relpath(machine, out),
+            own_body=body,
             seed=seed,
-            poses=_poses(machine, poses),
+            poses=_poses(described, poses),
             noise_mm=None if noise_um is None else 1e-3 * noise_um,
             hidden=Hidden({**known, **(effects or {})}),
             parameters=None if parameters is None else read_parameters(Path(parameters), described),
@@ -168,13 +175,22 @@ def _require_fresh(out: Path, truth: Path | None) -> None:
             )
 
 
-def _poses(machine: str, poses: int | File) -> int | np.ndarray:
+def _body(machine: str, asked: Mapping[str, Any]) -> Body | None:
+    """What physics a machine has; None for a virtual prototype."""
+    if machine in BODIES:
+        return body_named(machine)
+    if all(asked[key] == rest for key, rest in ONLY_MOCKS.items()):
+        return None
+    described = load_machine(machine)
+    return ArmBody(described) if is_arm(described) else None
+
+
+def _poses(described: Machine, poses: int | File) -> int | np.ndarray:
     """A number, or poses (N, k) in the machine's task coordinates."""
     if isinstance(poses, int):
         if poses < 1:
             raise ValueError("--poses must be at least 1")
         return poses
-    described = body_named(machine).machine
     rows = np.array(list(read_any_poses(Path(poses), described).values()))
     return np.asarray(task_values(described.task, Poses.from_xyz_rpy(rows.T)).T)
 
@@ -182,7 +198,7 @@ def _poses(machine: str, poses: int | File) -> int | np.ndarray:
 def _said(run: SimulatedRun, out: Path, truth: Path) -> dict[str, Any]:
     return {
         "format": "pkm-simulated/1",
-        "machine": run.plan.machine,
+        "machine": run.plan.body.machine.name,
         "run": str(out),
         "truth": str(truth),
         "seed": run.plan.seed,

@@ -7,11 +7,24 @@ from pathlib import Path
 import numpy as np
 
 from app.files.text import read_text
-from app.files.urdf import MOVING, UrdfArm, UrdfJoint, angles_of, read_urdf, transform, urdf_text
+from app.files.urdf import (
+    MOVING,
+    UrdfArm,
+    UrdfJoint,
+    angles_of,
+    read_tree,
+    read_urdf,
+    transform,
+    urdf_text,
+    xml_of,
+)
+from app.files.urdf_chain import limits_of, plain, words_of
+from app.files.urdf_loops import loops_in_toml, loops_in_urdf
 from app.jobs.completing import completed
+from app.jobs.urdf_closed import Tree, closed_text, closed_urdf
 from calib.arrays import Array
 from calib.errors import BadInput
-from calib.mechanism.check import pose_in_file
+from calib.mechanism.check import pose_in_file, require_sound
 from calib.mechanism.description import Element, Machine
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.parse import parse_machine
@@ -24,8 +37,6 @@ WIDEST = float(np.pi / 2)
 """Farthest from zero that a joint is at home, rad."""
 BOX_MM, BOX_RAD = 0.08, float(np.deg2rad(15.0))
 """Half of the workspace box: a part of the arm's length, and an angle."""
-KEPT = 1e-12
-"""Lengths (mm) and angles (rad) below which nothing is written into a chain."""
 
 
 def machine_of_urdf(
@@ -34,11 +45,15 @@ def machine_of_urdf(
     name: str = "",
     base: str = "",
     tip: str = "",
+    loops: Path | None = None,
     tolerance_mm: float = 0.5,
     tolerance_rad: float = 3e-3,
     tool: bool = False,
 ) -> str:
-    """Text of the machine file of a URDF's chain, with the errors that a calibration can see.
+    """Text of the machine file of a URDF, with the errors that a calibration can see.
+
+    A chain, or the limbs of a parallel machine where ``loops`` names a list of constraints or the
+    URDF holds some (:mod:`app.files.urdf_loops`).
 
     Errors are those of ``machine complete``: by rank, of the tolerances that are given; with
     ``tool`` also those of the nests on the flange.
@@ -48,14 +63,23 @@ def machine_of_urdf(
     BadInput
         For a URDF that is none, or a chain that cannot be calibrated; with its place.
     """
-    arm = read_urdf(read_text(file), str(file), base, tip)
-    name = name or re.sub(r"[^a-z0-9-]+", "-", arm.name.lower()).strip("-") or "arm"
+    place, text = f"{file}", read_text(file)
+    root = xml_of(text, place)
+    name = name or re.sub(r"[^a-z0-9-]+", "-", root.get("name", "arm").lower()).strip("-") or "arm"
+    usual = {"mm": tolerance_mm, "rad": tolerance_rad}
+    closing = (
+        loops_in_urdf(root, place) if loops is None else loops_in_toml(read_text(loops), f"{loops}")
+    )
+    if closing.loops:
+        text = closed_text(Tree(*read_tree(root, place), place), closing, name, base)
+        machine = parse_machine(text, place)
+        require_sound(machine, text)
+        return completed(text, machine, usual, tool=tool).text
+    arm = read_urdf(text, place, base, tip)
     q = _home(arm)
-    place = f"{file}"
     bare = parse_machine(_text(arm, name, q, "pose = {}", None), place)
     home = forward(bare, bare.home_q[:, None])
     text = _text(arm, name, q, pose_in_file(home.poses), home)
-    usual = {"mm": tolerance_mm, "rad": tolerance_rad}
     return completed(text, parse_machine(text, place), usual, tool=tool).text
 
 
@@ -63,17 +87,10 @@ def _driven(arm: UrdfArm) -> list[UrdfJoint]:
     return [one for one in arm.joints if one.kind in MOVING and one.mimic is None]
 
 
-def _limits(one: UrdfJoint) -> tuple[float, float]:
-    """In mm or rad; a joint that turns without end has a turn either way."""
-    scale = 1.0 if MOVING[one.kind] else 1000.0
-    low, high = one.limits or ((-2.0 * np.pi, 2.0 * np.pi) if MOVING[one.kind] else (-1.0, 1.0))
-    return float(scale * low), float(scale * high)
-
-
 def _home(arm: UrdfArm) -> Array:
     """Joint values, mm or rad, far from where the arm is singular: the best of a fixed sequence."""
     driven = _driven(arm)
-    limits = np.array([_limits(one) for one in driven])
+    limits = np.array([limits_of(one) for one in driven])
     reach = np.array([WIDEST if MOVING[one.kind] else np.inf for one in driven])
     low, high = np.maximum(limits[:, 0], -reach), np.minimum(limits[:, 1], reach)
     low, high = np.where(low < high, low, limits[:, 0]), np.where(low < high, high, limits[:, 1])
@@ -94,11 +111,11 @@ def _text(arm: UrdfArm, name: str, q: Array, pose: str, home: Configuration | No
     actuators = []
     driven = _driven(arm)
     for k, (one, value) in enumerate(zip(driven, q, strict=True), start=1):
-        low, high = _limits(one)
+        low, high = limits_of(one)
         unit = "rad" if MOVING[one.kind] else "mm"
         actuators.append(
             f'q{k} = {{ unit = "{unit}", home = {float(value)!r}, limits = [{low!r}, {high!r}], '
-            f'says = "{_plain(one.name)}" }}'
+            f'says = "{plain(one.name)}"{_gear(arm, one)} }}'
         )
     count = min(len(driven), len(FULL))
     if count < len(FULL):
@@ -124,11 +141,36 @@ def _text(arm: UrdfArm, name: str, q: Array, pose: str, home: Configuration | No
             "",
             "[limbs.arm]",
             'chain = """',
-            *_words(arm, driven),
+            *words_of(arm.joints, driven, arm.name, named=_links(arm)),
             '"""',
             "",
+            *_masses(arm),
         ]
     )
+
+
+def _gear(arm: UrdfArm, one: UrdfJoint) -> str:
+    ratio = arm.gears.get(one.name, 0.0) if MOVING[one.kind] else 0.0
+    return f", gear = {ratio!r}" if ratio else ""
+
+
+def _links(arm: UrdfArm) -> dict[str, str]:
+    """Names of what stands behind the joints that carry a mass."""
+    moving = [one.name for one in arm.joints if one.kind in MOVING]
+    return {one.joint: f"link{moving.index(one.joint) + 1}" for one in arm.masses}
+
+
+def _masses(arm: UrdfArm) -> list[str]:
+    """What the links weigh, as traits."""
+    names = _links(arm)
+    lines = ["[limbs.arm.traits.masses]"] if arm.masses else []
+    for number, one in enumerate(arm.masses, start=1):
+        centre = [round(1000.0 * float(v), 6) for v in one.centre]
+        lines.append(
+            f'm{number} = {{ behind = "{names[one.joint]}", mass_kg = {one.kg!r}, '
+            f"com = {centre} }}  # {re.sub(r'[^ -~]', '', one.link)}"
+        )
+    return [*lines, ""] if lines else []
 
 
 def _box(home: Configuration) -> list[str]:
@@ -141,90 +183,20 @@ def _box(home: Configuration) -> list[str]:
     ]
 
 
-def _plain(text: str) -> str:
-    return re.sub(r'["\\]', "", text)
-
-
-def _words(arm: UrdfArm, driven: list[UrdfJoint]) -> list[str]:
-    """The chain, a line a joint; joints that follow another name its actuator."""
-    names = {one.name: (f"q{k}", MOVING[one.kind]) for k, one in enumerate(driven, start=1)}
-    lines = []
-    for one in arm.joints:
-        words = [f"t{a}:{1000.0 * v!r}" for a, v in zip("xyz", map(float, one.xyz), strict=True)
-                 if abs(1000.0 * v) > KEPT]  # fmt: skip
-        roll, pitch, yaw = map(float, one.rpy)
-        turns = (("z", yaw), ("y", pitch), ("x", roll))
-        words += [f"r{a}:{v!r}" for a, v in turns if abs(v) > KEPT]
-        if one.kind in MOVING:
-            words += _moving(one, _drive(one, names, arm.name))
-        if words:
-            lines.append(" ".join(words))
-    return lines
-
-
-def _drive(
-    one: UrdfJoint, driven: Mapping[str, tuple[str, bool]], place: str
-) -> tuple[float, str, str, float]:
-    """Factor, its unit, actuator and offset of a joint's value, mm or rad."""
-    turns = MOVING[one.kind]
-    if one.mimic is None:
-        return 1.0, "", driven[one.name][0], 0.0
-    leader, factor, offset = one.mimic
-    if leader not in driven:
-        raise BadInput(
-            f'joint "{one.name}" follows "{leader}", which is not on the way to the tip',
-            place=place,
-            remedy="Name another --tip",
-        )
-    name, leads_by_turning = driven[leader]
-    unit = ""
-    if turns != leads_by_turning:
-        factor, unit = (factor / 1000.0, "rad/mm") if turns else (factor * 1000.0, "mm/rad")
-    return factor, unit, name, offset * (1.0 if turns else 1000.0)
-
-
-def _moving(one: UrdfJoint, drive: tuple[float, str, str, float]) -> list[str]:
-    """A joint about an axis: one of the frame's own, or its z turned there and back."""
-    factor, unit, q, offset = drive
-    letter = "R" if MOVING[one.kind] else "T"
-    along = int(np.argmax(np.abs(one.axis)))
-    sign = float(np.sign(one.axis[along]))
-    straight = np.abs(one.axis[along]) > 1.0 - 1e-12
-    factor = factor * sign if straight else factor
-    offset = offset * sign if straight else offset
-    value = q if factor == 1.0 and not unit else f"{factor!r}{unit}*{q}"
-    value += f"{offset:+.17g}" if offset else ""
-    if straight:
-        return [f"{letter}{'xyz'[along]}:{value}"]
-    x, y, z = map(float, one.axis)
-    swing, lean = float(np.arctan2(y, x)), float(np.arctan2(np.hypot(x, y), z))
-    return [
-        f"rz:{swing!r}",
-        f"ry:{lean!r}",
-        f"{letter}z:{value}",
-        f"ry:{-lean!r}",
-        f"rz:{-swing!r}",
-    ]
-
-
 def urdf_of(
     machine: Machine, values: Mapping[str, float], controller: Mapping[str, float], remark: str
 ) -> str:
-    """A URDF of an arm with the geometry that was found.
+    """A URDF of a machine with the geometry that was found; loops are elements of their own.
 
     What the controller takes off its coordinates (references) is in the URDF: its joints are q.
 
     Raises
     ------
     BadInput
-        For a machine that is no serial chain of driven joints.
+        For what a URDF cannot say: gears, screws, parts that yield.
     """
     if len(machine.limbs) != 1 or machine.joints:
-        raise BadInput(
-            f'"{machine.name}" is no serial chain of driven joints: URDF holds no closed loop',
-            place="--as urdf",
-            remedy="Export parameters in another form",
-        )
+        return closed_urdf(machine, values, controller, remark)
     parameters = machine.vector(values)
     reference = machine.reference(controller)
     frame = np.eye(4)

@@ -138,6 +138,12 @@ def complete(machine_name: str, tool: bool, out: Path | None, as_json: bool) -> 
 @click.option("--name", default="", help="Name of the machine.  [default: the robot's]")
 @click.option("--base", default="", help="Link to begin with.  [default: the root]")
 @click.option("--tip", default="", help="Link to end with.  [default: the only end]")
+@click.option(
+    "--loops",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="List of constraints that close the loops of a parallel machine.",
+)
 @click.option("--tolerance", default="0.5 mm", show_default=True, help="Of errors of place.")
 @click.option("--angle", default="0.2 deg", show_default=True, help="Of errors of direction.")
 @click.option("--tool", is_flag=True, help="Errors of the nests on the flange as well.")
@@ -148,15 +154,18 @@ def import_(
     name: str,
     base: str,
     tip: str,
+    loops: Path | None,
     tolerance: str,
     angle: str,
     tool: bool,
     force: bool,
 ) -> None:
-    """Make a machine file of the serial chain that a URDF describes.
+    """Make a machine file of what a URDF describes: a serial chain, or a parallel machine.
 
     Joints become q1, q2, ... in their order, fixed joints are part of the links, joints that mimic
-    others follow them. The errors that a calibration can see are put in by rank, as pkmcal machine
+    others follow them. A URDF is a tree: where loops close, which joints are driven, and what is
+    commanded, stands in the list of --loops (docs/machine-files.md), or in elements that export
+    --as urdf writes. The errors that a calibration can see are put in by rank, as pkmcal machine
     complete does; home is a pose far from singular ones. xacro files are expanded first.
     """
     from app.files.machines import load_machine
@@ -169,6 +178,7 @@ def import_(
         name=name,
         base=base,
         tip=tip,
+        loops=loops,
         tolerance_mm=quantity(tolerance, "mm", "--tolerance"),
         tolerance_rad=quantity(angle, "rad", "--angle"),
         tool=tool,

@@ -48,8 +48,9 @@ def command(machine: str, out: Path, truth: Path | None, as_json: bool, **option
     """Write a simulated run of MACHINE, and apart from it the truth.
 
     For the hexapod, the tripod and the ptm the physics is that of the mock machines and shares
-    nothing with the model that is fitted. Any other machine, also one of your own, is a virtual
-    prototype: errors within its tolerances, solved exactly by the engine, without hidden effects.
+    nothing with the model that is fitted; so it is for arms, your own too, once something is to
+    be hidden. Any other machine is a virtual prototype: errors within its tolerances, solved by
+    the engine, without hidden effects.
     The same seed gives the same run; changing the noise changes nothing else. FILE with poses is
     a poses file or a CSV table.
     """

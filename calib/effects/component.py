@@ -21,7 +21,7 @@ from typing import Literal
 
 import numpy as np
 
-from calib.arrays import Array, IntArray
+from calib.arrays import Array, BoolArray, IntArray
 from calib.effects.lever import lever_of, through, whitened_frame
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import element_twists
@@ -218,6 +218,10 @@ class Effect(ABC):
             if name.endswith("_C") and not -40.0 < float(np.median(values)) < 60.0:
                 return f"{name} reads {np.median(values):.4g}, which is no room in deg C"
         return ""
+
+    def told(self, rows: Rows) -> BoolArray:
+        """Readings (N,) of whose runs it is known what the effect needs; others are left out."""
+        return np.ones(rows.count, dtype=bool)
 
     @abstractmethod
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:

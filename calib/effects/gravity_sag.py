@@ -11,8 +11,9 @@ compliances of the closure are in the file's proportion to them.
 
 import numpy as np
 
-from calib.arrays import Array
+from calib.arrays import Array, BoolArray
 from calib.effects.component import Effect, Signature, Situation, alone
+from calib.effects.link_weight import link_forces, link_mass_kg
 from calib.mechanism.axes import units_of
 from calib.mechanism.closure import Closure, Standing
 from calib.mechanism.compiled import compile_machine
@@ -29,7 +30,7 @@ def actuator_forces(situation: Situation) -> Array:
     twists = situation.actuator_twists
     forces: Array = np.einsum("icr,cr->ir", twists[:, :3], force)
     forces += np.einsum("icr,cr->ir", twists[:, 3:], moment)
-    return forces
+    return forces + link_forces(rows)
 
 
 def weight_wrench(rows: Rows, rotation: Array) -> tuple[Array, Array]:
@@ -53,15 +54,23 @@ def weight_wrench(rows: Rows, rotation: Array) -> tuple[Array, Array]:
 
 def weightless(rows: Rows) -> str:
     """Say why readings tell nothing of the weight: no [load], no mass; empty if they do."""
-    if any(run.header.load is None for run in rows.runs):
+    loads = [run.header.load for run in rows.runs if run.header.load is not None]
+    if not loads:
         return "run.toml has no [load]"
+    known = rows.on_platform & under_load(rows)
     masses = rows.channels.get("payload_kg", np.zeros(rows.count))
-    if not np.isfinite(masses[rows.on_platform]).any():
+    if not np.isfinite(masses[known]).any():
         return "the column payload_kg is empty"
-    weight = max(r.header.load.platform_mass_kg for r in rows.runs if r.header.load is not None)
-    if weight == 0.0 and not np.nan_to_num(masses).any():
+    weight = max(load.platform_mass_kg for load in loads) + link_mass_kg(rows.machine)
+    if weight == 0.0 and not np.nan_to_num(masses[known]).any():
         return "neither platform nor payload has a mass"
     return ""
+
+
+def under_load(rows: Rows) -> BoolArray:
+    """Readings (N,) of runs that say what the machine carries."""
+    stated = np.array([run.header.load is not None for run in rows.runs], dtype=bool)
+    return np.asarray(stated[rows.run])
 
 
 def spring_compliance(machine: Machine) -> float:
@@ -80,7 +89,7 @@ class GravitySag(Effect):
     id = "gravity-sag"
     kind = "machine"
     says = "legs, rods or drives give way under the weight of platform and payload"
-    depends = ("payload_kg",)
+    depends = ("run", "payload_kg")
     wrong_sign = "gravity in [load], or the sign of z, is the wrong way round"
     wrong_size = "payload_kg, or a mass in [load], is not in kg (payload in grams?)"
 
@@ -93,6 +102,10 @@ class GravitySag(Effect):
     def unavailable(self, rows: Rows) -> str:
         """Without a weight."""
         return weightless(rows)
+
+    def told(self, rows: Rows) -> BoolArray:
+        """Those of runs with [load]."""
+        return under_load(rows)
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``gravity-sag.c``, mm/N or rad/(N mm); ``.c_linear`` and ``.c_rotary`` where both are."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray, IntArray
 from calib.effects.component import Effect, Signature, Situation, alone, per_actuator
-from calib.effects.gravity_sag import actuator_forces, spring_compliance, weightless
+from calib.effects.gravity_sag import actuator_forces, spring_compliance, under_load, weightless
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.rigid import cross
@@ -30,7 +30,7 @@ class LegCompliance(Effect):
     id = "leg-compliance"
     kind = "machine"
     says = "legs or drives give way under the weight, each by a compliance of its own"
-    depends = ("payload_kg",)
+    depends = ("run", "payload_kg")
     wrong_sign = "gravity in [load], or the sign of z, is the wrong way round"
     wrong_size = "payload_kg, or a mass in [load], is not in kg (payload in grams?)"
 
@@ -42,6 +42,10 @@ class LegCompliance(Effect):
     def unavailable(self, rows: Rows) -> str:
         """Without a weight, or where none of it rests on an actuator."""
         return weightless(rows) or ("" if loaded(rows).size else "no actuator carries the weight")
+
+    def told(self, rows: Rows) -> BoolArray:
+        """Those of runs with [load]."""
+        return under_load(rows)
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``leg-compliance.leg1`` ..., mm/N or rad/(N mm)."""

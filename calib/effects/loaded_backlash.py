@@ -6,9 +6,9 @@ forces F_i are those of ``leg-compliance``.
 
 import numpy as np
 
-from calib.arrays import Array
+from calib.arrays import Array, BoolArray
 from calib.effects.component import Effect, Signature, Situation, alone, per_actuator
-from calib.effects.gravity_sag import actuator_forces, spring_compliance, weightless
+from calib.effects.gravity_sag import actuator_forces, spring_compliance, under_load, weightless
 from calib.effects.leg_compliance import loaded
 from calib.mechanism.description import Machine
 from calib.runs.stack import Rows
@@ -21,7 +21,7 @@ class LoadedBacklash(Effect):
     id = "loaded-backlash"
     kind = "machine"
     says = "legs or drives lose motion when they turn round, the more the more they carry: friction"
-    depends = ("direction", "payload_kg")
+    depends = ("run", "direction", "payload_kg")
     wrong_sign = "the rows stand in another order than they were measured in, or q counts backwards"
 
     def lacking(self, machine: Machine) -> str:
@@ -32,6 +32,10 @@ class LoadedBacklash(Effect):
     def unavailable(self, rows: Rows) -> str:
         """Without a weight, or where none of it rests on an actuator."""
         return weightless(rows) or ("" if loaded(rows).size else "no actuator carries the weight")
+
+    def told(self, rows: Rows) -> BoolArray:
+        """Those of runs with [load]."""
+        return under_load(rows)
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``loaded-backlash.leg1`` ..., mm/N or rad/(N mm)."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from calib.arrays import Array, IntArray
 from calib.effects.gravity_sag import weight_wrench, weightless
+from calib.effects.link_weight import link_forces
 from calib.formulas.functions import OWN, POINT, POSE
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.rigid import rotate, to_euler
@@ -47,7 +48,8 @@ def forces(rows: Rows) -> Array:
     twists = pose_jacobians(rows.machine, closed).actuators[:, :, which]
     force, moment = weight_wrench(rows, closed.poses.rotation[:, :, which])
     along = np.einsum("icr,cr->ir", twists[:, :3], force)
-    return np.asarray(along + np.einsum("icr,cr->ir", twists[:, 3:], moment))
+    along += np.einsum("icr,cr->ir", twists[:, 3:], moment)
+    return np.asarray(along + link_forces(rows))
 
 
 def ways(rows: Rows) -> Array:

@@ -73,10 +73,17 @@ def slip(fitted: Fit) -> Slip | None:
             best = Slip(int(kept[at]), k, values, fall)
     if best is None or best.fall < max(FALL, SLIP_SHARE * excess(fitted)):
         return None
-    if best.fall < _slow(fitted, best.actuator) + CLEAR:
+    if best.fall < _slow(fitted, best.actuator) + CLEAR or _put_on(fitted, best.row):
         return None
     late = fitted.model.rows.time_s >= best.values[-1]
     return best if 0 < int(late.sum()) < late.size else None
+
+
+def _put_on(fitted: Fit, row: int) -> bool:
+    """Whether a payload was put on or taken off at that reading: what follows is its weight."""
+    payload = fitted.model.rows.channels.get("payload_kg")
+    before = np.flatnonzero(fitted.accepted[:row])
+    return payload is not None and before.size > 0 and payload[row] != payload[before[-1]]
 
 
 def _slow(fitted: Fit, actuator: int) -> float:

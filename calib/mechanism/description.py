@@ -44,7 +44,8 @@ class Actuator:
     """A driven coordinate q; the mechanism is extended by s = q - reference.
 
     ``reference`` is a number, or the name of the parameter whose value *in the controller* is the
-    reference (hexapod: L0). ``home`` and ``limits`` are values of q, in ``unit``.
+    reference (hexapod: L0). ``home`` and ``limits`` are values of q, in ``unit``. ``gear``: turns
+    of the motor for one of the joint; 0 where the file does not say.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Actuator:
     home: float
     limits: tuple[float, float]
     reference: float | str
+    gear: float = 0.0
 
 
 @dataclass(frozen=True)

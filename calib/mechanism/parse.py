@@ -22,7 +22,7 @@ _TOP = (
 )  # fmt: skip
 _KEPT = ("effects", "drawing", "closure", "nests")
 """Tables for the parts of the program that ask for them."""
-_ACTUATOR_KEYS = ("unit", "reference", "home", "limits", "says")
+_ACTUATOR_KEYS = ("unit", "reference", "home", "limits", "gear", "says")
 
 
 def parse_machine(text: str, source: str) -> Machine:
@@ -175,6 +175,18 @@ def _actuator(name: str, table: TomlTable) -> Actuator:
             remedy="Write a home within them, or wider limits",
         )
     table.text("says", "")
+    gear = table.optional_number("gear", above=0.0)
+    if gear is not None and unit != "rad":
+        raise table.wrong(
+            f"{name} is in mm: a gear stands before a joint that turns",
+            "gear",
+            remedy="Leave it out; the pitch of a screw is [effects.screw-cyclic] period.",
+        )
     return Actuator(
-        name, unit, home, limits, reference if is_name else table.quantity("reference", unit, 0.0)
+        name,
+        unit,
+        home,
+        limits,
+        reference if is_name else table.quantity("reference", unit, 0.0),
+        gear or 0.0,
     )

@@ -10,23 +10,25 @@
     parallelogram = ["dh1", "dh2"]
     platform_azimuth = "dtheta_Bz"
     yields = "spring"
+    masses = { upper = { behind = "q2", mass_kg = 8.4, com = [0.0, 0.0, 212.0] } }
 
 A name is that of an element (``leg=Ty:q+L0``), or of what stands in its value (``q``, ``L0``).
 """
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from calib.mechanism.chain import ChainNames
 from calib.mechanism.description import Element, Limb
-from calib.mechanism.traits import Part, Traits, UniversalJoint
+from calib.mechanism.traits import LinkMass, Part, Traits, UniversalJoint
 from calib.toml_table import TomlTable
 
 KEYS = (
     "grows", "base_joint", "platform_joint", "screw", "parallelogram", "platform_azimuth", "yields",
 )  # fmt: skip
+MASSES = "masses"
 
 
 def has_role(element: Element, kind: str) -> bool:
@@ -47,8 +49,10 @@ class TraitReader:
 
     def read(self) -> list[Limb]:
         """The limbs (one for each chain) with their traits."""
-        self.table.only(*KEYS)
-        table = {key: self.table.raw(key, "text or list of texts") for key in self.table}
+        self.table.only(*KEYS, MASSES)
+        table = {
+            key: self.table.raw(key, "text or list of texts") for key in self.table if key != MASSES
+        }
         for key, value in table.items():
             self._check_names(key, value)
         return [
@@ -73,7 +77,28 @@ class TraitReader:
                 for part in self._parts("platform_azimuth", name, chain, "fixed turn")
             ),
             yields=self._spring(table, chain),
+            masses=tuple(self._masses(chain)),
         )
+
+    def _masses(self, chain: int) -> Iterator[LinkMass]:
+        """Masses of links; only where every joint of the chain is driven."""
+        named = self.table.named(MASSES, required=False)
+        if named.names() and (self.limbs[chain].joints or len(self.limbs) > 1):
+            raise self._fail(
+                MASSES,
+                f'limb "{self.limb}" has joints without an actuator',
+                "Masses of links are for arms, whose joints are all driven; what a platform "
+                "weighs stands in [load] of a run.",
+            )
+        for key in named:
+            about = named.table(key)
+            about.only("behind", "mass_kg", "com")
+            self._check_names(MASSES, about.text("behind"))
+            names = self.names[chain]
+            name = about.text("behind")
+            places = names.elements.get(name) or [p.element for p in names.values.get(name, [])]
+            x, y, z = about.numbers("com", 3)
+            yield LinkMass(max(places), about.number("mass_kg", above=0.0), (x, y, z))
 
     def _check_names(self, key: str, value: object) -> None:
         """Every name must stand in a chain of the limb."""

@@ -25,6 +25,15 @@ class UniversalJoint:
 
 
 @dataclass(frozen=True)
+class LinkMass:
+    """A mass that rides on a chain: ``kg``, its centre in the frame behind an element, mm."""
+
+    element: int
+    kg: float
+    centre: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
 class Traits:
     """Traits of one chain.
 
@@ -43,6 +52,8 @@ class Traits:
         Turn of the platform joint's frame about the platform's z axis.
     yields : int or None
         The compliant element that is a spring under the weight of the platform.
+    masses : tuple of LinkMass
+        Links of a chain whose joints are all driven, as far as they have a weight.
     """
 
     grows: tuple[int, ...] = ()
@@ -52,6 +63,7 @@ class Traits:
     sides: tuple[Part, ...] = ()
     platform_azimuth: tuple[Part, ...] = ()
     yields: int | None = None
+    masses: tuple[LinkMass, ...] = ()
 
 
 NO_TRAITS = Traits()

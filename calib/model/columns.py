@@ -20,8 +20,8 @@ def at_trial(unknowns: Sequence[Unknown], trial: Sequence[float]) -> Array:
 
 
 def channels_known(effect: Effect, rows: Rows) -> BoolArray:
-    """Readings (N,) that have every channel that an effect needs (reference readings always)."""
-    known = np.ones(rows.count, dtype=bool)
+    """Readings (N,) that have all that an effect needs to be told (reference readings always)."""
+    known = effect.told(rows)
     for name in (*effect.channels, *effect.depends):
         if name in rows.channels:
             known &= np.isfinite(rows.channels[name])

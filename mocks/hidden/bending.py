@@ -12,6 +12,7 @@ class Bending(HiddenEffect):
     numbers = "k"
     says = "mm/K: legs bend when structure and air differ, sunny side more"
     machines = ("hexapod",)
+    arms = False
     trial = 1e-3
 
     def draw(self, site: Site, rng: np.random.Generator) -> Table:

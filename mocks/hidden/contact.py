@@ -36,7 +36,7 @@ class Contact(HiddenEffect):
     def physics(self, hidden: Hidden, limbs: tuple[str, ...], stroke: Stroke) -> Physics:
         """Nothing until there, then in proportion to the way."""
         soft = hidden.limbs("contact.*", limbs)
-        first, last = stroke.ends
+        first, last = (np.asarray(end) for end in stroke.ends)
         at = first + hidden.get("contact.at", 0.5) * (last - first)
         side = hidden.get("contact.side", 1.0)
 

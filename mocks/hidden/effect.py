@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from mocks.hidden.table import Hidden
 
 Table = dict[str, float]
-LIMB = r"(leg[1-6]|limb[1-3])"
+LIMB = r"(leg[1-6]|limb[1-3]|q[1-9])"
 """Pattern of a limb's name in the pattern of an effect's numbers."""
 EVERYWHERE = ("hexapod", "tripod", "ptm")
 
@@ -40,6 +40,11 @@ class Site:
     nests: tuple[str, ...]
     stroke: Stroke = MILLIMETRES
     span_s: float = 1200.0
+
+    @property
+    def loaded(self) -> tuple[str, ...]:
+        """Limbs that carry the weight: of an arm the shoulder and the elbow."""
+        return self.limbs[1:3] if self.machine == "arm" else self.limbs
 
     @property
     def rotary(self) -> bool:
@@ -100,6 +105,8 @@ class HiddenEffect:
         What its numbers mean, with their unit.
     machines : tuple of str
         Mock machines that can have it.
+    arms : bool
+        Whether arms can have it, too: what hangs on no part of a parallel machine.
     unseen : tuple of str
         Those on which it moves no simulated reading: no blind trial draws it there.
     steady : tuple of str
@@ -115,6 +122,7 @@ class HiddenEffect:
     numbers: str
     says: str
     machines: tuple[str, ...] = EVERYWHERE
+    arms: bool = True
     unseen: tuple[str, ...] = ()
     steady: tuple[str, ...] = ()
     trial: float = 0.01
@@ -136,6 +144,10 @@ class HiddenEffect:
     def physics(self, hidden: "Hidden", limbs: tuple[str, ...], stroke: Stroke) -> Physics:
         """What it adds on any machine."""
         return Physics()
+
+    def of(self, machine: str) -> bool:
+        """Whether a mock machine, or an arm ("arm"), can have it."""
+        return machine in self.machines or (machine == "arm" and self.arms)
 
     def known(self, name: str) -> bool:
         """Whether ``name`` begins with its identifier."""

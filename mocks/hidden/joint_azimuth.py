@@ -12,6 +12,7 @@ class JointAzimuth(HiddenEffect):
     numbers = LIMB
     says = "rad: platform joint's azimuth less the slider's"
     machines = ("tripod",)
+    arms = False
     trial = 1e-4
 
     def draw(self, site: Site, rng: np.random.Generator) -> Table:

@@ -12,6 +12,7 @@ class JointTilt(HiddenEffect):
     numbers = rf"{LIMB}\.(base|platform)\.(y|z)"
     says = "rad: turn of a joint about its local y or z"
     machines = ("hexapod",)
+    arms = False
     trial = 2e-3
 
     def draw(self, site: Site, rng: np.random.Generator) -> Table:

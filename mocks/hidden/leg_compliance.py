@@ -23,7 +23,7 @@ class LegCompliance(HiddenEffect):
 
     def example(self, site: Site) -> Table:
         """Two soft ones, one of them twice as soft."""
-        first, *_, last = site.limbs
+        first, *_, last = site.loaded
         soft = 3e-8 if site.rotary else 4e-4
         return {f"leg-compliance.{first}": soft, f"leg-compliance.{last}": 0.5 * soft}
 

@@ -24,7 +24,7 @@ class LoadedBacklash(HiddenEffect):
 
     def example(self, site: Site) -> Table:
         """Two, one of them twice as stiff in its nut."""
-        first, *_, last = site.limbs
+        first, *_, last = site.loaded
         lost = 3e-8 if site.rotary else 6e-4
         return {f"loaded-backlash.{first}": lost, f"loaded-backlash.{last}": 0.5 * lost}
 

@@ -12,6 +12,7 @@ class ParallelogramSides(HiddenEffect):
     numbers = LIMB
     says = "mm: side 1 less side 2"
     machines = ("tripod",)
+    arms = False
 
     def draw(self, site: Site, rng: np.random.Generator) -> Table:
         """One limb or all."""

@@ -12,6 +12,7 @@ class Redundancy(HiddenEffect):
     numbers = "limb|share"
     says = "limb 1 to 4 whose constraint is released, wholly or by a share of its stiffness"
     machines = ("ptm",)
+    arms = False
     steady = ("limb",)
     trial = 0.1
     linear = False

@@ -12,6 +12,7 @@ class ScrewTwist(HiddenEffect):
     numbers = "L"
     says = "mm a turn: lead of the screws"
     machines = ("hexapod",)
+    arms = False
     trial = 1.0
 
     def draw(self, site: Site, rng: np.random.Generator) -> Table:

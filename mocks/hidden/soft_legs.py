@@ -14,6 +14,7 @@ class SoftLegs(HiddenEffect):
     numbers = "k"
     says = "1/N: compliance that grows with extension, k s F"
     machines = ("hexapod",)
+    arms = False
     trial = 1e-6
 
     def draw(self, site: Site, rng: np.random.Generator) -> Table:

@@ -65,7 +65,7 @@ class Hidden:
         """Raise ValueError for what this machine does not have."""
         for name in self.values:
             limb, effect = re.search(LIMB, name), _effect_of(name)
-            absent = effect is not None and machine not in effect.machines
+            absent = effect is not None and not effect.of(machine)
             if absent or (limb is not None and limb.group() not in limbs):
                 raise ValueError(f'the mock {machine} has no hidden effect "{name}"')
 

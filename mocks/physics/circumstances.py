@@ -11,6 +11,7 @@ import numpy as np
 from mocks.physics.pose import Array
 
 REFERENCE_C = 20.0
+Ends = float | tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,8 @@ class Stroke:
     ``per_mm``: what moves the machine as 1 mm of a leg does; ``cycle``: period of the cyclic
     error where none is given; ``speed``: per s; ``counts``: the drive's counts in a unit;
     ``digits``: decimals of q in a file; ``smallest``: change that reverses an actuator;
-    ``ends``: how far it may go from home.
+    ``ends``: how far it may go, all alike or each; ``gears``: turns of each motor for one of its
+    joint.
     """
 
     per_mm: float = 1.0
@@ -29,7 +31,8 @@ class Stroke:
     counts: float = 1e6
     digits: int = 6
     smallest: float = 1e-4
-    ends: tuple[float, float] = (-35.715, 34.285)
+    ends: tuple[Ends, Ends] = (-35.715, 34.285)
+    gears: tuple[float, ...] = ()
 
 
 MILLIMETRES = Stroke()

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from calib.runs import Digits, Header, Load, Run, covariance_matrices, format_header, format_points
-from mocks.physics.bodies import body_named
 from mocks.physics.pose import Array
 from mocks.simulate.plan import RunPlan
 from mocks.simulate.run import SimulatedRun
@@ -25,7 +24,7 @@ def points_csv(run: SimulatedRun) -> str:
 def digits(plan: RunPlan) -> Digits:
     """What the instruments of a campaign show of each number."""
     return Digits(
-        time=".2f", q=f".{body_named(plan.machine).stroke.digits}f", position=".6f", sigma=".6f",
+        time=".2f", q=f".{plan.body.stroke.digits}f", position=".6f", sigma=".6f",
         covariance=".6e", channel=".3f", channels={"delay_s": ".2f", "cycle": ".0f"},
     )  # fmt: skip
 
@@ -62,7 +61,7 @@ def _channels(run: SimulatedRun) -> dict[str, Array]:
 
 
 def _header(run: SimulatedRun) -> Header:
-    plan, around = run.plan, body_named(run.plan.machine).around
+    plan, around = run.plan, run.plan.body.around
     load = plan.load or around.load
     nests = plan.nests or around.platform_nests
     return Header(

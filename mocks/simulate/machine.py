@@ -15,6 +15,7 @@ from mocks.simulate.layout import HOME, Layout
 from mocks.simulate.plan import RunPlan
 
 DRAWN_AT_ONCE = 4
+MOST_ROUNDS = 100
 
 
 def controller_parameters(machine: Machine, given: Mapping[str, float]) -> dict[str, float]:
@@ -32,17 +33,22 @@ def random_poses(body: Body, held: Mapping[str, float], plan: RunPlan, count: in
     box = np.array([machine.workspace[name] for name in machine.task.coordinates])
     low, high = machine.q_limits.T
     found = np.empty((0, len(box)))
-    while len(found) < count:
+    for _ in range(MOST_ROUNDS):
+        if len(found) >= count:
+            return found[:count]
         tried = rng.uniform(box[:, 0], box[:, 1], (DRAWN_AT_ONCE * count, len(box)))
         q = body.commanded(held, tried)
         inside = np.all((q >= low) & (q <= high), axis=1)
         found = np.vstack([found, tried[inside]])
-    return found[:count]
+    raise ValueError(
+        f"{len(found)} of {MOST_ROUNDS * DRAWN_AT_ONCE * count} poses of the workspace are in reach"
+    )
 
 
 def commanded_q(body: Body, held: Mapping[str, float], poses: Array, rows: Layout) -> Array:
-    """Commanded actuator coordinates of every row, (R, n): home is s = 0."""
-    q = np.vstack([body.commanded(held, poses), body.reference(held)])
+    """Commanded actuator coordinates of every row, (R, n); home as the controller has it."""
+    away = body.machine.home_q - body.machine.reference()
+    q = np.vstack([body.commanded(held, poses), body.reference(held) + away])
     assert HOME == -1, "home is the last row"
     return np.round(q[rows.pose], body.stroke.digits)
 

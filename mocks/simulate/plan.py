@@ -8,6 +8,8 @@ import numpy as np
 
 from mocks.hidden.table import Hidden
 from mocks.physics.actuators import Load
+from mocks.physics.bodies import body_named
+from mocks.physics.body import Body
 from mocks.physics.pose import Array
 
 Order = Literal["nest-by-nest", "pose-by-pose"]
@@ -34,7 +36,9 @@ class RunPlan:
     Attributes
     ----------
     machine : str
-        A machine that there is a body of (``mocks.physics.bodies``).
+        A machine that there is a body of (``mocks.physics.bodies``); else what its run says.
+    own_body : Body, optional
+        The body of a machine of one's own.
     seed : int
         Draws truth, room, noise and, where ``poses`` is a number, the poses.
     poses : int or array, shape (N, k)
@@ -81,6 +85,12 @@ class RunPlan:
     strays: int = 0
     title: str = ""
     machine: str = "hexapod"
+    own_body: Body | None = None
+
+    @property
+    def body(self) -> Body:
+        """The machine."""
+        return self.own_body or body_named(self.machine)
 
     def rng(self, purpose: int) -> np.random.Generator:
         """A generator of its own for each purpose, so that one choice does not shift another."""

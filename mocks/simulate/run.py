@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.mechanism.description import Machine
-from mocks.physics.bodies import body_named
 from mocks.physics.body import Body
 from mocks.physics.pose import Array, Pose
 from mocks.physics.room import Distortions, Station
@@ -46,7 +45,7 @@ class SimulatedRun:
 
 def simulate(plan: RunPlan) -> SimulatedRun:
     """Run a campaign; raises ValueError for poses that are out of reach."""
-    body = body_named(plan.machine)
+    body = plan.body
     machine, around = body.machine, body.around
     parameters = dict(plan.parameters or draw_parameters(machine, plan.seed, plan.prior))
     held = machines.controller_parameters(machine, plan.controller)

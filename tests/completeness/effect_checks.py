@@ -25,7 +25,9 @@ from calib.unknown import Unknown
 from mocks.hidden import HiddenEffect
 from mocks.hidden.effect import Site
 from mocks.hidden.table import Hidden
+from mocks.physics.arm_body import ArmBody, is_arm
 from mocks.physics.bodies import BODIES, body_named
+from mocks.physics.body import Body
 from mocks.physics.truth import nominal_parameters
 from mocks.simulate.files import points_csv, run_toml
 from mocks.simulate.plan import Profile, RunPlan
@@ -98,13 +100,14 @@ def stale_rows(page: str) -> Iterator[str]:
 
 def unsimulated(effect: Effect, name: str, hidden: Sequence[HiddenEffect]) -> Iterator[str]:
     """What the mocks lack: the effect, a case that shows it, a draw for the blind trial."""
-    if name not in BODIES:
+    body = body_for(name)
+    if body is None:
         return
     mine = next((each for each in hidden if each.id == effect.id), None)
     if mine is None:
         yield f"mocks/hidden has no {effect.id}"
         return
-    if name not in mine.machines:
+    if not mine.of(body.kind):
         yield f"the mock {name} cannot have {effect.id}"
         return
     site = site_of(name)
@@ -119,7 +122,7 @@ def unsimulated(effect: Effect, name: str, hidden: Sequence[HiddenEffect]) -> It
             yield f"mocks/hidden: {effect.id} has no {what} for the {name}"
             continue
         try:
-            Hidden(table).check(name, site.limbs)
+            Hidden(table).check(body.kind, site.limbs)
         except ValueError as error:
             yield f"mocks/hidden: {what} of {effect.id}: {error}"
         if not set(table) & names:
@@ -131,7 +134,7 @@ def unsimulated(effect: Effect, name: str, hidden: Sequence[HiddenEffect]) -> It
 def unlike_the_mock(effect: Effect, name: str, hidden: Sequence[HiddenEffect]) -> Iterator[str]:
     """Readings that the mock's own physics moves otherwise than the effect's columns say."""
     mine = next((each for each in hidden if each.id == effect.id), None)
-    if name not in BODIES or mine is None or not mine.linear:
+    if body_for(name) is None or mine is None or not mine.linear:
         return
     plain, fitted = nominal_run(name)
     span = float(plain.layout.time[-1])
@@ -153,17 +156,26 @@ def unlike_the_mock(effect: Effect, name: str, hidden: Sequence[HiddenEffect]) -
         yield f"{name}: {effect.id} moves the mock by {largest:.3g} mm, {worst:.3g} mm otherwise"
 
 
+def body_for(name: str) -> Body | None:
+    """The physics of a machine; None for one that there is no mock of."""
+    if name in BODIES:
+        return body_named(name)
+    machine = machine_of(name)
+    return ArmBody(machine) if is_arm(machine) else None
+
+
 def site_of(name: str) -> Site:
-    body = body_named(name)
-    return Site(name, body.limbs, tuple(body.around.platform_nests), body.stroke)
+    body = body_for(name)
+    assert body is not None
+    return Site(body.kind, body.limbs, tuple(body.around.platform_nests), body.stroke)
 
 
 @cache
 def nominal_run(name: str) -> tuple[SimulatedRun, Fit]:
     """A mock exactly as drawn, without noise worth the name, and the fit to it."""
     nominal = nominal_parameters(machine_of(name))
-    plan = RunPlan(machine=name, seed=5, poses=12, noise_mm=1e-5, parameters=nominal,
-                   profile=PROFILE, delays=True)  # fmt: skip
+    plan = RunPlan(machine=name, own_body=body_for(name), seed=5, poses=12, noise_mm=1e-5,
+                   parameters=nominal, profile=PROFILE, delays=True)  # fmt: skip
     run = simulate(plan)
     actuators = len(machine_of(name).actuators)
     rows = stack(machine_of(name), [parse_run(run_toml(run), points_csv(run), actuators=actuators)])

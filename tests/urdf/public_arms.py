@@ -30,6 +30,17 @@ PANDA = (
     (0.088, HALF, 0.0),
 )
 FLANGE = 0.107
+UR5E_KG = (3.761, 8.058, 2.846, 1.37, 1.3, 0.365)
+UR5E_COM = (
+    # in the frame behind each joint's a, alpha, d
+    (0.0, -0.02561, 0.00193),
+    (0.2125, 0.0, 0.11336),
+    (0.15, 0.0, 0.0265),
+    (0.0, -0.0018, 0.01634),
+    (0.0, 0.0018, 0.01634),
+    (0.0, 0.0, -0.001159),
+)
+GEAR = 101
 LIMITS = {
     "ur5e": [(-6.28, 6.28)] * 6,
     "panda": [(-2.8973, 2.8973), (-1.7628, 1.7628), (-2.8973, 2.8973), (-3.0718, -0.0698),
@@ -61,6 +72,42 @@ def flange_of(arm: str, q: Array) -> Array:
     for (a, alpha, d), value in zip(PANDA, q, strict=True):
         at = at @ turn("x", alpha) @ shift(a, 0, 0) @ turn("z", value) @ shift(0, 0, d)
     return at @ shift(0, 0, FLANGE)
+
+
+def heavy_ur5e() -> str:
+    """The URDF of a UR5e with what its links weigh, and with gears."""
+    text = urdf_of("ur5e")
+    for k, ((a, alpha, d), kg, com) in enumerate(zip(UR5E, UR5E_KG, UR5E_COM, strict=True)):
+        at = shift(0, 0, d) @ shift(a, 0, 0) @ turn("x", alpha)
+        x, y, z = (at @ np.append(com, 1.0))[:3]
+        link = f'<link name="l{k + 1}"'
+        text = text.replace(
+            f"{link}/>",
+            f'{link}><inertial><origin xyz="{x} {y} {z}"/><mass value="{kg}"/></inertial></link>',
+        )
+        text = text.replace(
+            "</robot>",
+            f'<transmission name="t{k}"><joint name="joint{k + 1}"/><actuator name="m{k}">'
+            f"<mechanicalReduction>{GEAR}</mechanicalReduction></actuator></transmission></robot>",
+        )
+    return text
+
+
+def torques_of_ur5e(q: Array) -> Array:
+    """Torque (6,) of the links' weight about each joint, N mm, from their centres of mass."""
+    at, axes, centres = np.eye(4), [], []
+    for (a, alpha, d), value, com in zip(UR5E, q, UR5E_COM, strict=True):
+        axes.append((at[:3, 3], at[:3, 2]))
+        at = at @ turn("z", value) @ shift(0, 0, d) @ shift(a, 0, 0) @ turn("x", alpha)
+        centres.append((at @ np.append(com, 1.0))[:3])
+    weight = [np.array([0.0, 0.0, -9.80665 * kg]) for kg in UR5E_KG]
+    return np.array([
+        1000.0 * sum(
+            axis @ np.cross(centre - foot, force)
+            for centre, force in list(zip(centres, weight, strict=True))[k:]
+        )
+        for k, (foot, axis) in enumerate(axes)
+    ])  # fmt: skip
 
 
 def urdf_of(arm: str) -> str:

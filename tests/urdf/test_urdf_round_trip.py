@@ -155,10 +155,3 @@ def test_the_verbs_bring_an_arm_in_and_out(
     capsys.readouterr()
     assert run(["export", str(model), "--as", "urdf"]) == 0
     assert len(read_urdf(capsys.readouterr().out, "out").joints) == 7
-
-
-def test_a_closed_machine_has_no_urdf() -> None:
-    from app.files.machines import load_machine
-
-    with pytest.raises(BadInput, match="no closed loop"):
-        urdf_of(load_machine("hexapod"), {}, {}, "")
