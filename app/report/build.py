@@ -15,6 +15,7 @@ from app.files.staircase import Way
 from app.history.store import Entry, History
 from app.report.accuracy import Tolerance
 from app.report.html import html_of
+from app.report.issued import note_issued
 from app.report.page import Page
 from app.report.pdf import pdf_of
 from app.report.record import record_page
@@ -91,6 +92,7 @@ def write_report(runs: tuple[str, ...], asked: Asked, outs: Sequence[Path]) -> N
             raise BadInput(
                 f"cannot write: {error}", place=str(out), remedy="Name another --out."
             ) from error
+    note_issued(page.number, runs, outs)
 
 
 def record_of_runs(runs: tuple[str, ...], asked: Asked) -> tuple[Page, Site | None]:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from app.session.events import FrameFound
 from app.session.journal import PLANNED
 from app.session.kinds import DRIFT
 from app.session.work import Work
@@ -23,6 +24,7 @@ def recall(work: Work) -> None:
     last = work.last_references()
     if found and len(last) >= 3:
         drawn = np.array([work.site.base_nests[nest] for nest in last]).T
-        memory.frame, _ = fit_frame(drawn, np.array(list(last.values())).T)
+        memory.frame, rms = fit_frame(drawn, np.array(list(last.values())).T)
         memory.frame_found = True
+        memory.base = FrameFound(memory.frame.numbers(), rms, tuple(last))
     memory.verified = work.journal.readings() == 0

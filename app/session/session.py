@@ -254,8 +254,10 @@ class Session:
                 raise self._stopped() from fault
             with contextlib.suppress(sqlite3.Error):
                 self.work.note("fault", str(fault))
-            remedy = f"{fault.remedy or 'Put it right'}; then: pkmcal resume {self.folder}"
-            self.observers.tell(Fault(fault.what, remedy, safe))
+            remedy = (
+                f"{(fault.remedy or 'Put it right').rstrip('.')}; then: pkmcal resume {self.folder}"
+            )
+            self.observers.tell(Fault(_named(fault), remedy, safe))
             raise
         except StoppedByOperator:
             await self.station.safe_stop()
@@ -370,3 +372,9 @@ class Session:
         self.journal.set_meta("finished_utc", datetime.now(UTC).isoformat(timespec="seconds"))
         self.observers.tell(Finished(str(run_folder), readings))
         return Outcome(self.folder, run_folder, readings)
+
+
+def _named(fault: DeviceError | GateRefused | BadInput) -> str:
+    """What happened, and to which device or in which file."""
+    where = getattr(fault, "device", "") or getattr(fault, "place", "")
+    return f"{where}: {fault.what}" if where else fault.what

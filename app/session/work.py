@@ -11,6 +11,7 @@ from app.files.site import Limits, Site
 from app.session.events import (
     AlarmRaised,
     Event,
+    FrameFound,
     PromptAnswered,
     PromptNeeded,
     ReadingRejected,
@@ -37,6 +38,8 @@ class Memory:
     frame: Frame
     """The base in the tracker's frame: as the site says, or fitted to what the journal holds."""
     frame_found: bool = False
+    base: FrameFound | None = None
+    """How the base was found, where the journal tells."""
     verified: bool = True
     """Whether the last reference still holds; False after whatever may have moved things."""
     aimed_at: str = ""

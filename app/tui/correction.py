@@ -104,8 +104,7 @@ class Corrections:
             raise
         else:
             self._desk.picture.run = "finished"
-            self._desk.done.add("applied")
-            self._desk.done -= {"left", "record"}
+            self._desk.course.written()
         finally:
             self.running = None
             self.comparison = None
@@ -173,6 +172,7 @@ class Corrections:
             after.callback(self.list_snapshots, station)
             await self._desk.as_job(undo(station, snapshot, f"undo to set {snapshot.number}"))
         self.comparison = None
+        self._desk.course.undone()
         self._desk.picture.run = "finished"
         self._desk.picture.write(f"set {snapshot.number} is back in the controller", "good")
 

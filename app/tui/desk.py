@@ -6,31 +6,30 @@ them on the banner. Nothing here draws.
 
 import asyncio
 import contextlib
-import json
 from collections.abc import Coroutine, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from app.again import command_of
 from app.errors import GateRefused, StoppedByOperator
-from app.files.site import Site, load_site, site_of_mock
+from app.files.site import Site, load_site
 from app.session import events as ev
 from app.session.plan import Plan
 from app.session.session import Outcome, Session
 from app.session.station import Station
 from app.tui.automatic import DECIDE, Automatic
 from app.tui.correction import KEEP, Corrections
+from app.tui.course import Course
 from app.tui.history_view import LookingBack
+from app.tui.mock_process import MockProcess
 from app.tui.picture import Picture
 from app.tui.study import Study
-from app.tui.verifying import Verified, verification_plan, verified
+from app.tui.verifying import verification_plan
 from app.tui.watching import Watching
-from drivers.errors import ConnectFailed, DeviceError, Silence
+from app.writeback.transfer import snapshots_of
+from calib.errors import BadInput
+from drivers.errors import ConnectFailed, DeviceError
 
 _Answer = TypeVar("_Answer")
-MOCK_START_S = 30.0
-MOCK_END_S = 5.0
 POLL_S = 0.5
 ENDS = (StoppedByOperator, GateRefused, DeviceError)
 """How a job ends early."""
@@ -51,19 +50,15 @@ class Desk:
         self.site: Site | None = None
         self.station: Station | None = None
         self.session: Session | None = None
-        self.mock: asyncio.subprocess.Process | None = None
-        self._mock_log: asyncio.Task[None] | None = None
+        self.mock: MockProcess | None = None
         self._job: asyncio.Task[Any] | None = None
         self.corrections = Corrections(self)
         self.automatic = Automatic(self)
         self._connecting = False
         self.study = Study(root, self.picture)
         self.past = LookingBack(root, self.picture)
+        self.course = Course(root, self.picture, self.study)
         self.watched: Watching | None = None
-        self.before: Verified | None = None
-        self.after: Verified | None = None
-        self.done: set[str] = set()
-        """What was done with the open site: ``found``, ``applied``, ``left``, ``record``."""
 
     # site and mock
 
@@ -76,7 +71,7 @@ class Desk:
         self._not_while_busy("change the site")
         await self.disconnect()
         self.site = site
-        self.done.clear()
+        self.course.begin()
         self.study.offers = site.offers
         self.station = Station(site)
         self.station.observers.watch(self._hear)
@@ -86,66 +81,16 @@ class Desk:
         """Start a mock station as a process and take its site; raises a DeviceError if it fails."""
         self._not_while_busy("start a mock")
         await self.end_mock()
-        # However this program ends, its mock's standard input ends with it, and so does the mock.
-        ends_with_us = ("--json", "--until-stdin-closes")
-        process = await asyncio.create_subprocess_exec(
-            *command_of("mock", *arguments, *ends_with_us),
-            stdin=asyncio.subprocess.PIPE,
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.PIPE,
-        )
-        self.mock = process
-        assert process.stdout is not None
-        try:
-            async with asyncio.timeout(MOCK_START_S):
-                line = await process.stdout.readline()
-        except TimeoutError as error:
-            await self.end_mock()
-            raise Silence(
-                f"said nothing within {MOCK_START_S:.0f} s", device="mock station"
-            ) from error
-        if not line:
-            said = await self._last_words(process)
-            await self.end_mock()
-            raise ConnectFailed(f"it ended at once: {said}", device="mock station")
-        # Pipes that nobody reads fill up and block the station.
-        self._mock_log = asyncio.create_task(self._drain(process))
-        await self._use(site_of_mock(json.loads(line)))
+        mock = await MockProcess.start(arguments, lambda line: self.picture.write(f"mock: {line}"))
+        self.mock = mock
+        await self._use(mock.site)
         self.picture.write("mock station started", "good")
-
-    async def _last_words(self, process: asyncio.subprocess.Process) -> str:
-        assert process.stderr is not None
-        try:
-            async with asyncio.timeout(MOCK_END_S):
-                lines = (await process.stderr.read()).decode(errors="replace").strip().splitlines()
-        except TimeoutError:
-            return "no reason given"
-        return lines[-1] if lines else "no reason given"
-
-    async def _drain(self, process: asyncio.subprocess.Process) -> None:
-        async def read(stream: asyncio.StreamReader | None) -> None:
-            while stream is not None and (line := await stream.readline()):
-                self.picture.write(f"mock: {line.decode(errors='replace').rstrip()}")
-
-        await asyncio.gather(read(process.stdout), read(process.stderr))
 
     async def end_mock(self) -> None:
         """End the mock station that was started here, if any."""
-        process, self.mock = self.mock, None
-        if process is None:
-            return
-        if process.returncode is None:
-            with contextlib.suppress(ProcessLookupError):
-                process.terminate()
-            try:
-                async with asyncio.timeout(MOCK_END_S):
-                    await process.wait()
-            except TimeoutError:
-                process.kill()
-                await process.wait()
-        if self._mock_log is not None:
-            self._mock_log.cancel()
-            self._mock_log = None
+        mock, self.mock = self.mock, None
+        if mock is not None:
+            await mock.end()
 
     # devices
 
@@ -159,7 +104,7 @@ class Desk:
         if self.connected or self._connecting:
             return
         station = self._need_station()
-        if self.mock is not None and self.mock.returncode is not None:
+        if self.mock is not None and self.mock.ended:
             raise ConnectFailed(
                 "the mock station that was started here has ended", remedy="Start another one (m)"
             )
@@ -170,6 +115,16 @@ class Desk:
             await station.poll()
         finally:
             self._connecting = False
+        await self._recall(station)
+
+    async def _recall(self, station: Station) -> None:
+        known = snapshots_of(station).all()
+        try:
+            await self.course.recall(
+                station.controller.identity.serial, known[-1].number if known else None
+            )
+        except BadInput as error:  # what cannot be read is no reason not to work
+            self.picture.write(f"what was done before is not known: {error}", "warn")
 
     async def disconnect(self) -> None:
         """Let the devices go."""
@@ -263,9 +218,9 @@ class Desk:
         finally:
             session.journal.close()
         if session.plan.purpose == "verify":
-            await self._judge(outcome.folder)
+            await self.course.judge(outcome.folder)
         elif session.plan.purpose == "measure":
-            self.study.choose((str(outcome.run_folder),))
+            self.course.measured(outcome.run_folder)
         return outcome
 
     # what became of it
@@ -285,45 +240,9 @@ class Desk:
         site = self.idle_station("verify").site
         await self.run(await verification_plan(site, quick))
 
-    async def _judge(self, folder: Path) -> None:
-        """Judge a finished verification; the last one before it becomes 'before'."""
-        judged = await asyncio.to_thread(verified, folder)
-        if self.after is not None:
-            self.before = self.after
-        self.after = judged
-        self.done.add("left" if "applied" in self.done else "found")
-        self.done.discard("record")
-        found = judged.found.measured
-        self.picture.write(
-            f"verified {len(judged.found.labels)} poses: peak {found.position_peak_um:.1f} um, "
-            f"{found.orientation_peak_deg:.4f} deg",
-            "good",
-        )
-
-    async def load_before(self, folder: Path) -> None:
-        """Let an earlier verification stand as 'before'."""
-        self.before = await asyncio.to_thread(verified, folder)
-        self.picture.write(f"before: {folder.name}")
-
     async def write_record(self, outs: Sequence[Path]) -> None:
-        """Write the calibration record of the runs that are studied, beside the other steps."""
-        model = self.corrections.model_file()
-        runs = self.study.runs
-        from app.report.build import Asked, write_report  # brings matplotlib: not at start
-
-        asked = Asked(
-            model=model,
-            mask=self.study.masked,
-            before=self.before.folder if self.before is not None else None,
-            after=self.after.folder if self.after is not None else None,
-            site=self.site,
-        )
-        if asked.before is None and "applied" not in self.done:
-            asked = replace(asked, before=asked.after, after=None)
-
-        await asyncio.to_thread(write_report, runs, asked, outs)
-        self.done.add("record")
-        self.picture.write(f"calibration record in {' and '.join(map(str, outs))}", "good")
+        """Write the calibration record of what is studied."""
+        await self.course.write_record(self.site, self.corrections.model_file(), outs)
 
     # the operator's keys
 
@@ -386,8 +305,9 @@ class Desk:
 
     def _need_station(self) -> Station:
         if self.station is None:
-            raise ConnectFailed(
-                "no site is open", remedy="Open a site file (o) or start a mock (m) first"
+            raise GateRefused(
+                "no site is open",
+                remedy="Open a site file (o) or start a mock (m) on the Devices screen (1)",
             )
         return self.station
 
@@ -395,16 +315,18 @@ class Desk:
         """The connected station while no job runs; raises what stands against it."""
         station = self._need_station()
         if not station.connected:
-            raise ConnectFailed(
+            raise GateRefused(
                 f"cannot {wish}: the devices are not connected",
-                remedy="Connect on the Devices screen first",
+                remedy="Connect on the Devices screen first (1 c)",
             )
         self._not_while_busy(wish)
         return station
 
     def _not_while_busy(self, wish: str) -> None:
         if self.busy:
-            raise GateRefused(f"cannot {wish} while a job runs", remedy="Stop the job first")
+            raise GateRefused(
+                f"cannot {wish} while a job runs", remedy="Wait until it ends, or stop it (ctrl+x)"
+            )
 
     def _running_session(self) -> Session:
         if self.session is None or not self.busy:

@@ -63,6 +63,7 @@ class DevicesFace(Face):
     def __init__(self) -> None:
         super().__init__()
         self._recent: list[SessionFacts] | None = None
+        self._mock_line = "hexapod --seed 7 --scale 20"
 
     def body(self) -> ComposeResult:
         """Site, controller and tracker; alarms beside or below them."""
@@ -140,10 +141,11 @@ class DevicesFace(Face):
 
         def entered(answer: str | None) -> None:
             if answer:
+                self._mock_line = answer
                 arguments = answer.split()
                 self.act(lambda: self._start(arguments), busy="starting a mock station ...")
 
-        self.app.push_screen(Enter("Start a mock", text, "hexapod --seed 7 --scale 20"), entered)
+        self.app.push_screen(Enter("Start a mock", text, self._mock_line), entered)
 
     async def _start(self, arguments: list[str]) -> None:
         await self.desk.start_mock(arguments)

@@ -172,10 +172,7 @@ class DiscoverFace(Face):
 
     def action_go_on(self) -> None:
         """Let the program add what is called for."""
-        if self.desk.study.search is None:
-            self.notify("Diagnose first (d).")
-            return
-        self.act(lambda: self.desk.study.change("go on"), busy="adding what is called for ...")
+        self.act(self.desk.study.go_on, busy="adding what is called for ...")
 
     def action_next(self) -> None:
         """Show the next dependence; on a narrow screen what is in the model, and back."""

@@ -14,7 +14,7 @@ from calib.discover.compare import compare_fit
 from calib.discover.compare_report import compare_report
 from calib.discover.diagnosis import RunDiagnosis
 from calib.discover.discovery import SEED, Refitter, discover_run, stage_of
-from calib.discover.report import diagnosis_report, effect_parameters
+from calib.discover.report import called_for, diagnosis_report, effect_parameters
 from calib.effects import catalogue
 from calib.errors import BadInput
 from calib.evidence.forward import speaks_against
@@ -30,6 +30,9 @@ class Stair:
     holdout_um: float
     holdout_floor_um: float
     chi2_per_dof: float
+    p_value: float | None = None
+    weak: bool = False
+    rivals: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +96,7 @@ class Search:
         after = self.refit(names).holdout
         if speaks_against(before, after):
             raise _refused(name, before, after)
-        self._climb(f"+ {name}", names)
+        self._climb(f"+ {name}", names, called_for(self.present.run, name))
         self._look(names)
 
     def remove(self, name: str) -> None:
@@ -107,17 +110,23 @@ class Search:
         found = discover_run(self.refit, self.present.effects)
         for number, step in enumerate(found.steps[1:], start=1):
             did = f"+ {step.added}" if step.added else f"- {step.removed}"
-            self._climb(did, stage_of(found, number).effects)
+            before = stage_of(found, number - 1).run
+            called = called_for(before, step.added) if step.added else {}
+            self._climb(did, stage_of(found, number).effects, called)
         self._look(found.last.effects)
 
-    def _climb(self, did: str, names: tuple[str, ...]) -> None:
-        """Put a step on the staircase."""
+    def _climb(
+        self, did: str, names: tuple[str, ...], called: Mapping[str, Any] | None = None
+    ) -> None:
+        """Put a step on the staircase; ``called``: how an effect was called for that is new."""
+        known = called or {}
         run = self.refit(names).run
         fit, held = run.fit, run.holdout
         self.stairs.append(
             Stair(
                 did, 1000.0 * fit.rms_mm, 1000.0 * fit.noise_floor_mm,
                 1000.0 * held.rms_mm, 1000.0 * held.floor_mm, fit.chi2_per_dof,
+                known.get("p_value"), bool(known.get("weak")), tuple(known.get("rivals", ())),
             )
         )  # fmt: skip
 

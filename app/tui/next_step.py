@@ -23,13 +23,18 @@ class JobStep:
 
 def job_steps(desk: "Desk") -> list[JobStep]:
     """The steps in their order, as far as this program has come with them."""
-    study, done = desk.study, desk.done
+    study, done = desk.study, desk.course.done
     view = study.search.view if study.search is not None else None
     fitted = study.answer is not None or view is not None
     adequate = view is not None and bool(view.diagnosis["adequate"])
     asking = "4 d" if view is None else "4 g"
     return [
-        JobStep("connect", "open a site or start a mock, and connect", "1 o m c", desk.connected),
+        JobStep(
+            "connect",
+            "open a site and connect (c), or start a mock, which connects by itself",
+            "1 c" if desk.site is not None else "1 o or m",
+            desk.connected,
+        ),
         JobStep("found", "verify before anything is changed", "6 v", "found" in done, True),
         JobStep("measure", "measure poses", "2 n", bool(study.runs), True),
         JobStep("fit", "fit the run", "3 f", fitted),

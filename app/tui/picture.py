@@ -63,6 +63,8 @@ class Trouble:
     what: str
     remedy: str
     level: Literal["warn", "bad"] = "bad"
+    passing: bool = False
+    """It answers a key and says nothing of the machine: the next key takes it away."""
 
 
 @dataclass
@@ -119,6 +121,7 @@ class Picture:
         work = session.work
         rows = [row for row in session.journal.rows(good_only=False) if row.kind == "reading"]
         self.rejected = sum(row.status != "good" for row in rows)
+        self.frame = work.memory.base
         if not work.memory.frame_found:
             return
         for row in rows:
@@ -145,6 +148,17 @@ class Picture:
         """Put something on the banner and into the log."""
         self.trouble = Trouble(what, remedy, level)
         self.write(f"{what}. {remedy}" if remedy else what, level)
+
+    def refuse(self, what: str, remedy: str) -> None:
+        """Say why a key did nothing, until another one is pressed."""
+        self.say_trouble(what, remedy)
+        self.trouble = Trouble(what, remedy, passing=True)
+
+    def pass_on(self) -> None:
+        """Take the answer to the last key away."""
+        if self.trouble is not None and self.trouble.passing:
+            self.trouble = None
+            self.revision += 1
 
     @property
     def busy(self) -> bool:

@@ -151,17 +151,25 @@ class Workbench(Painted[None]):
                     picture.revision += 1
 
         picture = self.desk.picture
+        picture.pass_on()
         if busy:
             picture.write(busy)
             picture.doing = busy
         self.run_worker(guarded(), group="act", exit_on_error=True)
 
     def put_up(self, error: Exception) -> None:
-        """Put an error on the banner: what happened and what to do."""
+        """Put an error on the banner: what happened and what to do.
+
+        A fault of the job stands there already, in its own words, which say how to go on.
+        """
         what, remedy = said(error)
-        trouble = self.desk.picture.trouble
-        if trouble is None or trouble.what != what:
-            self.desk.picture.say_trouble(what, remedy)
+        picture = self.desk.picture
+        if picture.trouble is not None and picture.trouble.what.startswith(what):
+            return
+        if isinstance(error, (BadInput, GateRefused)):
+            picture.refuse(what, remedy)
+        else:
+            picture.say_trouble(what, remedy)
 
     # keys that work everywhere
 
@@ -169,9 +177,10 @@ class Workbench(Painted[None]):
         """Stop; never waits for anything else that runs here."""
 
         async def stop() -> None:
+            ends_a_job = self.desk.busy
             words = await self.desk.stop()
             self.desk.picture.write(f"STOP: {words}", "warn")
-            if self.desk.picture.trouble is None or "NOT" in words:
+            if not ends_a_job or "NOT" in words:  # a job that was stopped says so on the banner
                 self.notify(words, title="STOP", severity="warning")
 
         self.run_worker(stop(), group="stop", exit_on_error=True)
@@ -186,6 +195,7 @@ class Workbench(Painted[None]):
 
     def action_show_face(self, mode: str) -> None:
         """Change to another screen."""
+        self.desk.picture.pass_on()
         self.switch_mode(mode)
 
     def action_show_side(self, mode: str) -> None:

@@ -142,6 +142,12 @@ class Study:
         self.effects = search.present.effects
         self._tell_stair(search)
 
+    async def go_on(self) -> None:
+        """Add by itself what is called for; what was not asked yet is asked first."""
+        if self.search is None:
+            await self.diagnose()
+        await self.change("go on")
+
     def _tell_stair(self, search: "Search") -> None:
         stair = search.stairs[-1]
         self._picture.write(
@@ -156,7 +162,8 @@ class Study:
             StairStep(
                 did=stair.did, chi2_per_dof=stair.chi2_per_dof, rms_um=stair.rms_um,
                 noise_floor_um=stair.floor_um, holdout_rms_um=_known(stair.holdout_um),
-                holdout_floor_um=_known(stair.holdout_floor_um),
+                holdout_floor_um=_known(stair.holdout_floor_um), p_value=stair.p_value,
+                weak=stair.weak, rivals=stair.rivals,
             )
             for stair in self.search.stairs
         ]  # fmt: skip

@@ -37,8 +37,9 @@ class VerifyFace(Face):
     about = (
         "v sends the machine over a grid of poses that no fit has seen and measures where it "
         "goes; nothing is fitted and nothing is written. The last verification stands as 'after', "
-        "the one before it as 'before'; o chooses another 'before'. A perfect machine would show "
-        "what the tracker's noise alone shows. On a mock the noise-free truth stands beside it."
+        "the last one before something was written as 'before'; o chooses another. A perfect "
+        "machine would show what the tracker's noise alone shows. On a mock the noise-free truth "
+        "stands beside it."
     )
     AUTO_FOCUS: ClassVar[str | None] = "#verify-table"
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -74,7 +75,7 @@ class VerifyFace(Face):
 
     def show(self, picture: Picture) -> None:
         """Draw summary, table and plots; the latter only when there is news."""
-        before, after = self.desk.before, self.desk.after
+        before, after = self.desk.course.before, self.desk.course.after
         self.query_one("#verify-summary", Static).update(
             summary_text(before, after, running_text(picture))
         )
@@ -145,7 +146,7 @@ class VerifyFace(Face):
 
         def picked(answer: str | None) -> None:
             if answer:
-                self.act(lambda: self.desk.load_before(Path(answer)))
+                self.act(lambda: self.desk.course.load_before(Path(answer)))
 
         options = [(str(folder), session_words(facts_of(folder))) for folder in found]
         self.app.push_screen(Pick("Before", "Finished verifications, newest first", options),

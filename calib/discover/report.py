@@ -115,9 +115,15 @@ def _record(found: RunDiagnosis) -> tuple[Remark, ...]:
 def _called_for(discovery: Discovery, number: int) -> dict[str, Any]:
     """p-value, evidence and rivals of an effect when it was added."""
     added = discovery.steps[number].added
-    if added is None:
-        return {}
-    before = stage_of(discovery, number - 1).run.diagnosis
+    return {} if added is None else called_for(stage_of(discovery, number - 1).run, added)
+
+
+def called_for(found: RunDiagnosis, added: str) -> dict[str, Any]:
+    """``p_value``, ``log_evidence``, ``weak`` and ``rivals`` of an effect, by the model before it.
+
+    Empty where the effect was no candidate.
+    """
+    before = found.diagnosis
     finding = next((one for one in before.findings if one.name == added), None)
     if finding is None:
         return {}

@@ -73,7 +73,7 @@ async def connect_and_measure(photographer: Photographer) -> None:
     desk = photographer.bench.desk
     await start_mock(photographer)
     await photographer.keys("6", "v", "q")
-    await photographer.until(lambda: desk.after is not None)
+    await photographer.until(lambda: desk.course.after is not None)
     await photographer.keys("2", "n", "enter")
     await photographer.until(lambda: desk.picture.purpose == "measure")
     await photographer.until(lambda: len(desk.picture.points) > 55)
@@ -97,7 +97,7 @@ async def correct(photographer: Photographer) -> None:
     await photographer.keys("k")
     await photographer.until(lambda: desk.picture.run == "finished")
     await photographer.keys("6", "v", "q")
-    await photographer.until(lambda: desk.before is not None)
+    await photographer.until(lambda: desk.course.before is not None)
     await photographer.picture("verify")
     await look_back(photographer)
     await photographer.keys("7")

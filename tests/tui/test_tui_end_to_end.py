@@ -91,10 +91,10 @@ async def test_connect_measure_fit_apply_verify_undo(tmp_path: Path) -> None:
         assert desk.picture.stages[-1].stage == "done"
 
         await pilot.press("6", "v", "q")
-        await until(pilot, lambda: desk.after is not None)
-        assert desk.after is not None
-        assert desk.after.found.truth is not None
-        assert desk.after.found.truth.position_peak_um < 15.0
+        await until(pilot, lambda: desk.course.after is not None)
+        assert desk.course.after is not None
+        assert desk.course.after.found.truth is not None
+        assert desk.course.after.found.truth.position_peak_um < 15.0
 
         await pilot.press("5", "u")
         await pilot.pause(0.3)

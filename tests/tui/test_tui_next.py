@@ -20,7 +20,7 @@ async def test_every_screen_says_what_comes_next(tmp_path: Path) -> None:
             await pilot.press(str(number))
             await pilot.pause()
             line = str(bench.screen.query_one(NextLine).render())
-            assert line.startswith("next 1 o m c")
+            assert line.startswith("next 1 o or m")
             assert len(line) <= 78
             assert line.endswith("record")
 
@@ -37,15 +37,15 @@ async def test_the_next_step_moves_on_with_the_job(tmp_path: Path) -> None:
             return step.word if step is not None else ""
 
         assert coming() == "found"
-        desk.done.add("found")
+        desk.course.done.add("found")
         assert coming() == "measure"
         desk.study.choose(("sessions/run",))
         assert coming() == "fit"
         desk.study.answer = stream.fitted()
         assert coming() == "discover"
-        desk.done.add("applied")
+        desk.course.done.add("applied")
         assert coming() == "left"
-        desk.done |= {"left", "record"}
+        desk.course.done |= {"left", "record"}
         assert coming() == ""
         assert next_of(job_steps(desk)) is None
 

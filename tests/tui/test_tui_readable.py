@@ -37,7 +37,7 @@ async def test_tables_fit_into_80_columns_though_the_terminal_was_wider(tmp_path
         await stream.put_up(bench, tmp_path)
         desk = bench.desk
         desk.study.answer, desk.study.search = stream.fitted(), stream.searched()
-        desk.before, desk.after = stream.verified(600.0, 1), stream.verified(5.0, 2)
+        desk.course.before, desk.course.after = stream.verified(600.0, 1), stream.verified(5.0, 2)
         desk.corrections.comparison = stream.compared()
         for key in TABLES:
             await pilot.press(key)

@@ -38,7 +38,7 @@ async def full(pilot: Pilot[Any], folder: Path) -> Workbench:
     desk.study.answer = stream.fitted()
     desk.automatic.show(stream.flown(folder / "auto-20261122-0800"))
     desk.study.search = stream.searched()
-    desk.before, desk.after = stream.verified(600.0, 1), stream.verified(5.0, 2)
+    desk.course.before, desk.course.after = stream.verified(600.0, 1), stream.verified(5.0, 2)
     desk.corrections.comparison = stream.compared()
     desk.corrections.snapshots = stream.snapshots()
     for gate in stream.compared().gates:

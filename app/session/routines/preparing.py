@@ -61,7 +61,7 @@ async def _clear_old_faults(work: Work) -> None:
     try:
         work.station.check()
     except DeviceFault as fault:
-        text = f"A fault stands from before: {fault}. Clear it and go on?"
+        text = f"A fault stands from before: {str(fault).rstrip('.')}. Clear it and go on?"
         if await work.ask(text, ("clear", "stop"), "clear") == "stop":
             raise StoppedByOperator(f"stopped because of a standing fault: {fault.what}") from None
         await work.controller.clear_faults()
