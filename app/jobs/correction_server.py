@@ -13,9 +13,13 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
+import numpy as np
+
 from app.errors import GateRefused
 from app.jobs.corrector import Corrector
 from app.plain_data import plain
+from calib.arrays import Array
+from calib.command import Trajectory
 from calib.errors import BadInput
 
 HOST = "127.0.0.1"
@@ -24,7 +28,7 @@ LONGEST_LINE = 65536
 MOST_CLIENTS = 32
 LARGEST = 1e9
 """Numbers beyond this, whatever their unit, are a fault of the client."""
-KNOWN = ("do", "id", "pose", "channels", "time_s", "keep", "extrapolate")
+KNOWN = ("do", "id", "pose", "poses", "channels", "time_s", "keep", "extrapolate")
 KINDS = {BadInput: "input", GateRefused: "region"}
 
 
@@ -38,7 +42,10 @@ class Client:
 
     def __init__(self, corrector: Corrector) -> None:
         self._corrector = corrector
-        self._history = corrector.history()
+        self._way = self._from_home()
+
+    def _from_home(self) -> Trajectory:
+        return Trajectory(self._corrector.identified, self._corrector.history())
 
     def answer(self, line: bytes) -> dict[str, Any]:
         """Answer one line; whatever is wrong with it is said in the answer."""
@@ -61,7 +68,7 @@ class Client:
         if do == "about":
             return {"ok": True, **self._about()}
         if do == "forget":
-            self._history = self._corrector.history()
+            self._way = self._from_home()
             return {"ok": True}
         if do == "correct":
             return {"ok": True, **self._correct(request)}
@@ -86,20 +93,19 @@ class Client:
 
     def _correct(self, request: Mapping[str, Any]) -> dict[str, Any]:
         corrector = self._corrector
-        task = corrector.task_of(_pose(request.get("pose"), corrector.coordinates))
+        many = "poses" in request
+        poses = _poses(request) if many else [request.get("pose")]
+        tasks = [corrector.task_of(_pose(one, corrector.coordinates)) for one in poses]
         channels = _channels(request.get("channels", {}))
-        time_s = request.get("time_s")
-        if time_s is not None:
-            time_s = _number(time_s, "time_s")
+        time_s = _times(request.get("time_s"), len(poses) if many else 0)
         keep, extrapolate = _flag(request, "keep", True), _flag(request, "extrapolate", False)
-        solved = corrector.solve(task[:, None], channels, time_s, self._history)
-        solved.check(["the pose"], extrapolate=extrapolate)
-        entry = solved.entries()[0]
+        solved = corrector.solve(np.array(tasks).T, channels, time_s, self._way)
+        names = [f"pose {k + 1}" for k in range(len(poses))] if many else ["the pose"]
+        solved.check(names, extrapolate=extrapolate)
+        entries = solved.entries()
         if keep:
-            whole = corrector.identified.remembers_path
-            motion = corrector.identified.motion
-            self._history = solved.commands.history.condensed(motion, whole_path=whole)
-        return entry
+            self._way.sent(solved.commands)
+        return {"poses": entries} if many else entries[0]
 
 
 def _read(line: bytes) -> dict[str, Any]:
@@ -124,6 +130,30 @@ def _pose(value: Any, coordinates: tuple[str, ...]) -> list[float]:
     if not isinstance(value, list):
         raise BadInput("there is no pose", remedy=f'Send "pose": [{", ".join(coordinates)}]')
     return [_number(one, "the pose") for one in value]
+
+
+def _poses(request: Mapping[str, Any]) -> list[Any]:
+    """Poses that are asked for together."""
+    value = request["poses"]
+    if "pose" in request or not isinstance(value, list) or not value:
+        raise BadInput(
+            "poses is no list, or pose is there too", remedy='Send "poses": [[...], [...]]'
+        )
+    return value
+
+
+def _times(value: Any, many: int) -> float | Array | None:
+    """Time of a pose in s, or of ``many``: one for all, or a list of them."""
+    if value is None:
+        return None
+    if not many or not isinstance(value, list):
+        return _number(value, "time_s")
+    if len(value) != many:
+        raise BadInput(
+            f"time_s has {len(value)} numbers, and there are {many} poses",
+            remedy="Send one number, or one for each pose",
+        )
+    return np.array([_number(one, "time_s") for one in value])
 
 
 def _channels(value: Any) -> dict[str, float]:

@@ -18,6 +18,7 @@ from calib.command import (
     History,
     Identified,
     Surroundings,
+    Trajectory,
     commands_for,
     pose_commands,
     pose_covariance,
@@ -155,9 +156,13 @@ class Corrector:
         task: Array,
         channels: Mapping[str, Any],
         time_s: Array | float | None,
-        history: History,
+        before: History | Trajectory,
     ) -> "Solved":
-        """Commands for task coordinates (k, N), one after the other; raises BadInput."""
+        """Commands for task coordinates (k, N), one after the other; raises BadInput.
+
+        ``before`` is what was commanded; a trajectory also begins where it ended, and is not told
+        that these were sent.
+        """
         if self.identified.needs_time and time_s is None:
             who = next(f.effect.id for f in self.identified.effects if "time_s" in f.effect.depends)
             raise BadInput(
@@ -165,7 +170,10 @@ class Corrector:
                 remedy="Say time_s of every pose, or --every SECONDS",
             )
         here = Surroundings(self.channels(channels), time_s)
-        found = commands_for(self.identified, task, here, history)
+        if isinstance(before, Trajectory):
+            found = before.solve(task, here, keep=False)
+        else:
+            found = commands_for(self.identified, task, here, before)
         return Solved(self, found, {n: here.channel(n, task.shape[1]) for n in here.channels})
 
 

@@ -3,10 +3,10 @@
 With y the wanted task coordinates, f(s) the platform's pose at the commands s (``standing``) and
 D = df/ds of the geometry alone, each pass asks the effects once and takes
 
-    s <- s + (T D)^-1 (y - f(s)),     T the task's rows.
+    s <- s + (T D)^-1 (y - f(s)) - d,     T the task's rows,
 
-What D leaves out is the slope of the effects by s, some hundredths at most, so every pass wins two
-digits or more. Commands of a sequence are solved together: each looks back on those before it as
+with d what the effects have changed the extensions by since the pass before. What D leaves out is
+the slope of the effects by s, some hundredths at most, so every pass wins two digits or more. Commands of a sequence are solved together: each looks back on those before it as
 they come out, so all that remembers agrees with what is commanded in the end.
 """
 
@@ -23,7 +23,7 @@ from calib.errors import BadInput
 from calib.mechanism.configuration import Configuration
 from calib.mechanism.limits import violations
 from calib.mechanism.rigid import Poses
-from calib.mechanism.solve import forward, inverse
+from calib.mechanism.solve import begun_at, forward, inverse
 from calib.mechanism.task import task_error, task_rows, task_values
 
 PATIENCE = 40
@@ -55,6 +55,8 @@ class Commands:
         Why a pose is not commanded; empty where it is. Those are not on the way of the others.
     history : History
         What was commanded, these included in their order; of alternatives that of before.
+    plain : (n, N)
+        Extensions by the geometry alone, mm or rad.
     """
 
     wanted: Array
@@ -66,6 +68,7 @@ class Commands:
     refused: tuple[str, ...]
     history: History
     standing: Standpoint
+    plain: Array
 
     @property
     def solved(self) -> BoolArray:
@@ -81,6 +84,7 @@ def commands_for(
     *,
     start: Configuration | None = None,
     alternatives: bool = False,
+    after: Commands | None = None,
 ) -> Commands:
     """Commands with which the machine, all its effects in it, takes the wanted poses.
 
@@ -97,6 +101,10 @@ def commands_for(
         Where the geometry begins: ``commands.standing.closed`` of a pose nearby.
     alternatives : bool
         Whether each pose is the next after the history, instead of all one after the other.
+    after : Commands, optional
+        The commands before, of poses nearby: their last one is where these begin, effects and all.
+        It saves passes, and steps that are smaller than what an effect makes of them (lost motion)
+        keep their direction.
 
     Returns
     -------
@@ -114,11 +122,17 @@ def commands_for(
     goal = task_values(machine.task, wanted) if isinstance(wanted, Poses) else np.asarray(wanted)
     _check(machine.task.coordinates, goal)
     surroundings, history = surroundings or Surroundings(), history or History.at_home(machine)
+    after = after if after is not None and after.solved[-1:].all() else None
+    if after is not None and start is None:
+        closed = after.standing.closed
+        start = begun_at(machine, closed.take(slice(closed.count - 1, closed.count)))
     plain = inverse(machine, goal, identified.parameters, start)
+    if after is not None and not plain.converged.all():
+        plain = inverse(machine, goal, identified.parameters)
     refused = _by_geometry(plain)
     while True:
         steps = _steps(refused, alternatives)
-        attempt = _solved(identified, goal, surroundings, history, steps, plain, refused)
+        attempt = _solved(identified, goal, surroundings, history, steps, plain, refused, after)
         if attempt.refused == refused:
             break
         refused = attempt.refused
@@ -179,11 +193,15 @@ def _solved(
     steps: IntArray,
     plain: Configuration,
     refused: tuple[str, ...],
+    after: Commands | None,
 ) -> Commands:
     """One attempt at all poses that are not refused yet."""
     kept = np.array([not why for why in refused], dtype=bool)
-    extension = np.where(kept, plain.extension, history.extension[:, -1:])
-    near: Standpoint | None = None
+    begin, near = plain.extension, None
+    if after is not None:
+        begin = begin + (after.extension - after.plain)[:, -1:]
+        near = after.standing.last(kept.size)
+    extension = np.where(kept, begin, history.extension[:, -1:])
     passes = best = waited = 0
     while True:
         rows = command_rows(identified, extension, surroundings, history, steps)
@@ -197,18 +215,19 @@ def _solved(
         best = max(best, done)
         if good.all() or waited > PATIENCE:
             break
-        moved = extension + np.where(kept, _towards(identified, error, near), 0.0)
+        step = _towards(identified, error, near) - near.drift
+        moved = extension + np.where(kept, step, 0.0)
         extension = np.where(np.isfinite(moved), moved, extension)
     why = _why(identified, near, refused, good, steps)
     solved = np.array([not one for one in why], dtype=bool)
     extension = np.where(solved, extension, np.nan)
     times = surroundings.times(goal.shape[1])
     q = identified.machine.coordinates(extension, identified.controller)
-    after = History(
+    told = History(
         np.concatenate([history.extension, extension[:, solved]], axis=1),
         np.concatenate([history.time_s, times[solved]]),
     )
-    return Commands(goal, extension, q, near.poses, miss, passes, why, after, near)
+    return Commands(goal, extension, q, near.poses, miss, passes, why, told, near, plain.extension)
 
 
 def _error(identified: Identified, goal: Array, near: Standpoint) -> Array:
@@ -230,8 +249,13 @@ def _towards(identified: Identified, error: Array, near: Standpoint) -> Array:
     slope = np.einsum("tcn,acn->nta", T, near.twists)
     finite = np.isfinite(slope).all(axis=(1, 2)) & np.isfinite(error).all(axis=0)
     slope = np.where(finite[:, None, None], slope, np.eye(*slope.shape[1:]))
-    step = np.einsum("nat,tn->an", np.linalg.pinv(slope), np.where(finite, error, 0.0))
-    return np.asarray(step)
+    wanted = np.where(finite, error, 0.0)
+    if slope.shape[1] == slope.shape[2]:
+        try:
+            return np.asarray(np.linalg.solve(slope, wanted.T[:, :, None])[:, :, 0].T)
+        except np.linalg.LinAlgError:
+            pass  # singular to the last digit: the smallest step will do
+    return np.asarray(np.einsum("nat,tn->an", np.linalg.pinv(slope), wanted))
 
 
 def _why(

@@ -6,7 +6,7 @@ agree. What an effect does to the platform itself (``Signature.twist``) comes la
 x -> x + v, R -> exp(omega) R.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,6 +41,8 @@ class Standpoint:
         As commanded, mm or rad.
     unrest : (N,)
         How much the effects changed in the last pass, as a part of the machine's size.
+    drift : (n, N)
+        How much they changed the extensions in it, mm or rad.
     situation : Situation
         What the effects were asked at.
     """
@@ -49,6 +51,7 @@ class Standpoint:
     closed: Configuration
     extension: Array
     unrest: Array
+    drift: Array
     situation: Situation
     _done: "_Changes"
 
@@ -56,6 +59,22 @@ class Standpoint:
     def agreed(self) -> BoolArray:
         """Whether the machine closes, and its effects agree with where it stands, (N,)."""
         return self.closed.converged & (self.unrest <= AGREED)
+
+    def last(self, count: int) -> "Standpoint":
+        """The last of its commands as where to begin ``count`` others nearby."""
+        done = self._done
+        parameters = None
+        if done.parameters is not None:
+            parameters = np.repeat(done.parameters[:, -1:], count, axis=1)
+        return replace(
+            self,
+            closed=self.closed.take(slice(self.closed.count - 1, self.closed.count)),
+            _done=_Changes(
+                np.repeat(done.extension[:, -1:], count, axis=1),
+                parameters,
+                np.repeat(done.twist[:, -1:], count, axis=1),
+            ),
+        )
 
     @property
     def twists(self) -> Array:
@@ -182,7 +201,8 @@ def one_pass(
         product(exponential(done.twist[3:]), closed.poses.rotation),
     )
     unrest = _unrest(identified, done, None if near is None else near._done)
-    return Standpoint(poses, closed, rows.extension, unrest, situation, done)
+    drift = done.extension if near is None else done.extension - near._done.extension
+    return Standpoint(poses, closed, rows.extension, unrest, drift, situation, done)
 
 
 def _situation(

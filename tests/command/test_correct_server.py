@@ -158,6 +158,33 @@ def test_a_port_that_is_taken_is_bad_input(served: tuple[object, int], model: Pa
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows cannot send SIGTERM to a process")
+def test_served_poses_together_are_those_one_by_one(client: Client) -> None:
+    told = {"payload_kg": 2.5}
+    poses = [[x, 0.5 * x, 220, 0, 0.01, 0] for x in (0.0, 4.0, 9.0, 7.0)]
+    one_by_one = [client.ask(pose=pose, channels=told)["q"] for pose in poses]
+    assert client.ask(do="forget")["ok"]
+    together = client.ask(poses=poses, channels=told)
+    assert together["ok"]
+    for one, entry in zip(one_by_one, together["poses"], strict=True):
+        assert entry["q"] == pytest.approx(one, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("request_", "says"),
+    [
+        ({"poses": []}, "poses is no list"),
+        ({"poses": [POSE], "pose": POSE}, "pose is there too"),
+        ({"poses": [POSE, [0, 0, 900, 0, 0, 0]]}, "pose 2: it passes a limit"),
+        ({"poses": [POSE, POSE], "time_s": [1.0]}, "time_s has 1 numbers"),
+        ({"poses": [POSE, POSE], "time_s": [1.0, None]}, "time_s: None is no finite number"),
+    ],
+)
+def test_served_poses_that_cannot_be_are_refused(client: Client, request_: dict, says: str) -> None:
+    found = client.ask(**request_, channels={"payload_kg": 2.5})
+    assert not found["ok"]
+    assert says in found["error"]
+
+
 def test_sigterm_ends_it_with_clients_there(served: tuple[subprocess.Popen[str], int]) -> None:
     process, port = served
     there = Client(port)

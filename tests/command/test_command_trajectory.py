@@ -1,0 +1,71 @@
+"""A stream of poses: in blocks of any size the commands are those of all poses together."""
+
+import numpy as np
+import pytest
+from command_cases import LOAD, machine_of
+
+from calib.command import Identified, Surroundings, Trajectory, commands_for
+from calib.effects import effect_named
+from calib.errors import BadInput
+
+PERIOD_S = 1e-3
+HERE = Surroundings({"payload_kg": 3.0})
+LOST_MM = 0.02
+
+
+def identified() -> Identified:
+    machine = machine_of("hexapod")
+    values = {"gravity-sag.c": 2e-4, "screw-cyclic.period": 5.0}
+    values |= {
+        f"screw-cyclic.leg{leg}.{wave}": 0.01 for leg in range(1, 7) for wave in ("sin", "cos")
+    }
+    values |= {f"backlash.leg{leg}": LOST_MM for leg in range(1, 7)}
+    effects = [effect_named(name, machine) for name in ("gravity-sag", "screw-cyclic", "backlash")]
+    return Identified.from_values(machine, values, effects, LOAD)
+
+
+def circle(poses: int, of: int = 4000) -> np.ndarray:
+    """Task coordinates (6, poses) at the beginning of a circle of ``of`` poses."""
+    angle = 2.0 * np.pi * np.arange(poses) / of
+    zero = np.zeros(poses)
+    return np.array([10 * np.sin(angle), 10 * np.cos(angle), 220 + zero, zero, zero, zero])
+
+
+@pytest.mark.parametrize("block", [1, 7, 30])
+def test_trajectory_in_blocks_is_the_trajectory(block: int) -> None:
+    machine, wanted = identified(), circle(30)
+    way = Trajectory(machine)
+    parts = [way.solve(wanted[:, k : k + block], HERE) for k in range(0, 30, block)]
+    whole = commands_for(machine, wanted, HERE)
+    assert all(part.solved.all() for part in parts)
+    np.testing.assert_allclose(np.concatenate([p.q for p in parts], axis=1), whole.q, atol=1e-6)
+
+
+def test_trajectory_of_small_steps_keeps_the_direction_of_lost_motion() -> None:
+    wanted = circle(400)
+    q = np.concatenate(list(Trajectory(identified()).blocks(wanted, PERIOD_S, HERE)), axis=1)
+    step = np.diff(q, axis=1)[:, 1:]
+    plain = np.diff(commands_for(Identified.from_values(machine_of("hexapod"), {}), wanted).q)[
+        :, 1:
+    ]
+    assert np.abs(plain).max() < LOST_MM  # smaller than what a turn of a leg takes up
+    turns = int(np.sum(np.diff(np.sign(plain), axis=1) != 0))
+    jumps = int(np.sum(np.abs(step - plain) > 0.5 * LOST_MM))
+    assert jumps == turns
+
+
+def test_trajectory_that_only_asks_is_not_sent() -> None:
+    way = Trajectory(identified())
+    first = way.solve(circle(3), HERE, keep=False)
+    assert way.history.count == 1
+    np.testing.assert_array_equal(way.solve(circle(3), HERE).q, first.q)
+    assert way.history.count > 1
+
+
+def test_trajectory_says_which_pose_is_refused() -> None:
+    wanted = circle(120)
+    wanted[2, 70] = 900.0
+    blocks = Trajectory(identified()).blocks(wanted, PERIOD_S, HERE)
+    assert next(blocks).shape == (6, 50)
+    with pytest.raises(BadInput, match="pose 71 of the trajectory: it passes a limit: q1"):
+        next(blocks)
