@@ -6,8 +6,9 @@ D = df/ds of the geometry alone, each pass asks the effects once and takes
     s <- s + (T D)^-1 (y - f(s)) - d,     T the task's rows,
 
 with d what the effects have changed the extensions by since the pass before. What D leaves out is
-the slope of the effects by s, some hundredths at most, so every pass wins two digits or more. Commands of a sequence are solved together: each looks back on those before it as
-they come out, so all that remembers agrees with what is commanded in the end.
+the slope of the effects by s, some hundredths at most, so every pass wins two digits or more.
+Commands of a sequence are solved together: each looks back on those before it as they come out, so
+all that remembers agrees with what is commanded in the end.
 """
 
 from dataclasses import dataclass, replace
