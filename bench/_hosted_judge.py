@@ -70,7 +70,7 @@ def judge(run: Run, wanted: Poses, identified: Identified, fit: Fit, q: Array, h
     base = fit_frame(base_local, run.position[:, base_rows])[0]
     trials = TRIALS
     frame_error = _fit_errors(base, base_local, run.covariance[:, :, base_rows], generator, trials)
-    moved = _by_parameters(identified, fit, q, here, generator, trials)
+    moved = moved_by_parameters(identified, fit, q, here, generator, trials)
     seen, squares, peaks = [], np.zeros(trials), np.zeros(trials)
     for k in range(wanted.count):
         rows = [
@@ -99,7 +99,7 @@ def judge(run: Run, wanted: Poses, identified: Identified, fit: Fit, q: Array, h
     return Judged(np.array(seen), expected, float(np.quantile(peaks, 0.99)), likely, fit_rms)
 
 
-def _by_parameters(
+def moved_by_parameters(
     identified: Identified,
     fit: Fit,
     q: Array,

@@ -3,7 +3,8 @@
     python -m bench hosted_wire [seed] [bare | node10]
 
 A mock station with the hidden effects of that seed is measured with two payloads and two
-temperatures, fitted, written to (host store, or controller), and verified at fresh poses.
+temperatures, fitted, written to (host store, or controller), and verified at fresh poses. At the
+end stands how far the mock was from its own physics at what was commanded: what the wire adds.
 """
 
 import json
@@ -29,6 +30,7 @@ from app.files.machines import load_machine
 from app.files.pose_table import Pose
 from app.files.runs import read_run
 from bench._hosted_judge import Judged, judge
+from bench._hosted_physics import added_by_the_wire
 from bench.hosted import EFFECTS, FROM_LIMITS_MM, hidden_of
 from calib.arrays import Array
 from calib.command import Identified, Surroundings
@@ -52,13 +54,14 @@ class Lab:
     folder: Path
     said: dict[str, Any]
 
-    def do(self, **what: object) -> None:
+    def do(self, **what: object) -> dict[str, Any]:
         """Ask the back door of the station."""
         host, port = self.said["hands"]["control"].rsplit(":", 1)
         with socket.create_connection((host, int(port)), timeout=30.0) as link:
             link.sendall(json.dumps(what).encode() + b"\n")
-            answer = json.loads(link.makefile().readline())
+            answer: dict[str, Any] = json.loads(link.makefile().readline())
         assert answer["ok"], answer
+        return answer
 
     def site(self, payload_kg: float, temperature_C: float) -> Path:
         """Put a mass on, bring the structure to a temperature; the site file that says the mass."""
@@ -119,6 +122,9 @@ def job(lab: Lab, seed: int, say: Callable[[str], None]) -> list[Judged]:
             f"99 % {one.peak_99:.2f}; in truth {seen.truth.position_rms_um:.2f}, by the fit's "
             f"covariance {one.fit_rms:.2f}"
         )
+    added = added_by_the_wire(lab.folder / "sessions", lab.do(do="truth"))
+    say(f"what the wire adds at {added.size} poses: {np.sqrt(np.mean(added**2)):.3f} um RMS, "
+        f"{added.max():.3f} at most")  # fmt: skip
     return answers
 
 

@@ -1,6 +1,7 @@
 """Sessions behind a proxy that spoils what passes: typed faults in time, no wrong value taken.
 
-    python -m bench wire_faults [--faults 2000] [--seed 1] [--link tracker | controller] [--page]
+    python -m bench wire_faults [--faults 2000] [--seed 1] [--link tracker | controller]
+        [--machine hexapod | tripod] [--with bare | pose | geocom | lines] [--page]
 
 A mock without errors of its own is measured once as it is; then again and again with a proxy
 between (bench/_wire_proxy.py) that delays, splits, merges, drops, duplicates, truncates, corrupts,
@@ -15,19 +16,23 @@ import io
 import json
 import os
 import random
+import socket
 import sys
 import tempfile
 import time
+import tomllib
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+
+import tomli_w
 
 from app.demo.station import mock_station
 from app.errors import GateRefused, StoppedByOperator
 from app.files.pose_table import Pose
 from app.files.site import Site, load_site
 from app.session.journal import Journal
-from app.session.plans import PlanOptions, measure_plan
+from app.session.plans import PlanOptions, measure_plan, order_for
 from app.session.session import Session
 from bench._reliability_page import Row, write_row
 from bench._wire_proxy import Proxy
@@ -38,18 +43,34 @@ POSES: dict[str, Pose] = {
     "b": (-6.0, 4.0, 216.0, 0.0, 0.06, -0.1),
     "c": (0.0, -7.0, 224.0, -0.05, 0.03, 0.05),
 }
-PLAN = PlanOptions(order="pose-by-pose", warm_up=False, two_face=False)
+TRIPOD: dict[str, Pose] = {
+    "a": (20.0, 0.0, -125.0, 0.0, 0.0, 0.0),
+    "b": (-25.0, 15.0, -150.0, 0.0, 0.0, 0.0),
+    "c": (0.0, -30.0, -140.0, 0.0, 0.0, 0.0),
+}
+PLAN = PlanOptions(warm_up=False, two_face=False)
 SCALE, LONGEST_S = 600.0, 60.0
+SLOW = {"geocom": 60.0, "lines": 40.0}
+"""Machine seconds in one of the wall where an instrument is asked for every reading by itself."""
 AWAY_MM = 0.2
 """A reading farther than this from the clean session's is wrong; noise is a few um."""
+VAGUE_MM = 2.0
+"""The same of a total station, whose readings scatter by some tenths."""
 
 
 Place = tuple[float, float, float]
 
 
+def poses_of(site: Site) -> dict[str, Pose]:
+    """Poses of its machine."""
+    return TRIPOD if site.machine.name == "tripod" else POSES
+
+
 async def measured(site: Site, root: Path, proxy: Proxy | None, share: float) -> tuple[str, Path]:
     """One session; what it ended with, and its folder."""
-    session = Session.create(site, measure_plan(site, POSES, PLAN), root, unattended=True)
+    options = replace(PLAN, order=order_for(site))
+    plan = measure_plan(site, poses_of(site), options)
+    session = Session.create(site, plan, root, unattended=True)
     try:
         async with asyncio.timeout(LONGEST_S):
             await session.connect()
@@ -94,16 +115,34 @@ def read(folder: Path) -> dict[str, Place]:
 
 def behind(site: Site, link: str, dice: random.Random) -> tuple[Site, Proxy]:
     """The site with a proxy in one of its links."""
-    if link == "tracker":
-        proxy = Proxy(site.tracker.address, dice)
-        settings = {**site.tracker.settings, "address": proxy.address}
-        tracker = replace(site.tracker, settings=settings, address=proxy.address)
-        return replace(site, tracker=tracker), proxy
-    proxy = Proxy(site.controller.address.removeprefix("socket://"), dice)
-    key = next(k for k, v in site.controller.settings.items() if v == site.controller.address)
-    address = f"socket://{proxy.address}"
-    settings = {**site.controller.settings, key: address}
-    return replace(site, controller=replace(site.controller, settings=settings)), proxy
+    part = site.tracker if link == "tracker" else site.controller
+    key, value = next(
+        (key, value) for key, value in part.settings.items()
+        if isinstance(value, str) and ":" in value and part.address.endswith(value)
+    )  # fmt: skip
+    far = value.removeprefix("socket://")
+    proxy = Proxy(far, dice)
+    settings = {**part.settings, key: value.replace(far, proxy.address)}
+    changed = replace(part, settings=settings, address=part.address.replace(far, proxy.address))
+    return replace(site, **{link: changed}), proxy
+
+
+def over_tcp(file: Path, port: int) -> Site:
+    """The site of a mock, its controller on TCP, its stream of lines as the shipped kind."""
+    told = tomllib.loads(file.read_text("utf-8"))
+    if "port" in told["controller"]:
+        told["controller"]["port"] = f"socket://127.0.0.1:{port}"
+    tracker = told["tracker"]
+    if tracker["kind"] == "line-stream":
+        tracker |= {"kind": "lines", "source": tracker.pop("address"), "unit": "mm"}
+        tracker["silence_s"] = 2.0
+    file.write_text(tomli_w.dumps(told), encoding="utf-8")
+    return load_site(file)
+
+
+def _free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        return int(taken.getsockname()[1])
 
 
 class Trial:
@@ -115,14 +154,19 @@ class Trial:
         self.ends: Counter[str] = Counter()
         self.faults: Counter[str] = Counter()
         self.readings = self.wrong = 0
+        self.away_mm = VAGUE_MM if options.kind == "geocom" else AWAY_MM
 
     async def sessions(self, folder: Path, number: int) -> None:
         """Measure once as it is, then spoilt, until there were enough faults."""
         options = self.options
         dice = random.Random(f"{options.seed} {options.link} {options.machine} {number}")
-        words = ["--truth", str(_truth(folder))]
-        with mock_station(options.machine, 1, SCALE, folder, words) as file:
-            site = load_site(file)
+        port = _free_port()
+        words = ["--truth", str(_truth(folder)), "--controller-port", str(port)]
+        words += [f"--{options.kind}"] if options.kind else []
+        words += ["--smrs", "1", "--no-base-smrs"] if options.kind == "lines" else []  # it sees one
+        scale = SLOW.get(options.kind, SCALE)
+        with mock_station(options.machine, 1, scale, folder, words) as file:
+            site = over_tcp(file, port)
             end, clean = await measured(site, folder / "clean", None, 0.0)
             assert end == "ended well", end
             true = read(clean)
@@ -140,7 +184,7 @@ class Trial:
         for step, xyz in found.items():
             self.readings += 1
             off = max(abs(a - b) for a, b in zip(xyz, true[step], strict=True))
-            if off > AWAY_MM:
+            if off > self.away_mm:
                 self.wrong += 1
                 print(f"a reading {off:.3g} mm off was taken at {step}", flush=True)
 
@@ -155,7 +199,9 @@ def main() -> int:
     parser.add_argument("--faults", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--link", choices=("tracker", "controller"), default="tracker")
-    parser.add_argument("--machine", default="hexapod")
+    parser.add_argument("--machine", choices=("hexapod", "tripod"), default="hexapod")
+    kinds = ("bare", "pose", "geocom", "lines")
+    parser.add_argument("--with", dest="kind", choices=kinds, default="", help="another device")
     parser.add_argument("--share", type=float, default=0.05)
     parser.add_argument("--lines", type=int, default=5)
     parser.add_argument("--seconds", type=float, default=300.0)
@@ -173,13 +219,15 @@ def main() -> int:
     says = (
         f"{ends['ended well']} ended well, {sessions - ends['ended well'] - found} by a typed "
         f"fault, {found} otherwise; {trial.wrong} of {trial.readings} readings off by more than "
-        f"{AWAY_MM} mm"
+        f"{trial.away_mm} mm"
     )
     print(f"{total} faults in {sessions} sessions, {time.monotonic() - begun:.0f} s: {says}")
     if options.page:
         words = f"wire_faults --link {options.link} --machine {options.machine}"
+        words += f" --with {options.kind}" if options.kind else ""
         command = f"{words} --faults {options.faults} --seed {options.seed}"
-        ran = f"{total} faults in {sessions} sessions, {options.machine}, {options.link}"
+        ran = f"{total} faults in {sessions} sessions, {options.machine}, "
+        ran += f"{options.kind} {options.link}".strip()
         write_row("wire", Row(command, ran, says))
     return 1 if found or trial.wrong else 0
 

@@ -7,6 +7,7 @@ from typing import Any
 from drivers.errors import DeviceError
 from drivers.interface import Tracker
 from drivers.kind import Kind, Setting, Surroundings
+from drivers.lines.patience import slow_on
 from drivers.lines.reading import PLAIN, UNITS, fault_in
 
 _LINKS = ("tcp", "serial", "file")
@@ -57,10 +58,9 @@ def _address(settings: Mapping[str, Any]) -> str:
 
 def _no_pattern(text: str) -> str:
     try:
-        re.compile(text)
+        return slow_on(re.compile(text), anywhere=True) if text else ""
     except re.error as error:
         return f"no pattern: {error}"
-    return ""
 
 
 KIND: Kind[Tracker] = Kind(

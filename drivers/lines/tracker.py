@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from drivers.errors import BeamBroken, DeviceError, LinkLost, Refused, Silence
+from drivers.errors import BeamBroken, DeviceError, LinkLost, NotReady, Refused, Silence
 from drivers.interface import (
     Alarm,
     Identity,
@@ -21,6 +21,9 @@ from drivers.lines.source import REMEDY, Source
 
 LEAST_SAMPLES = 3
 """Lines of a stream that make a dwell at least."""
+STRAY, STRAY_MM = 30.0, 0.1
+"""A line so many times farther from the others of its dwell than these among themselves, and by so
+much in any case, has lost a digit on its way, or was taken while somebody touched the SMR."""
 
 
 @dataclass(frozen=True)
@@ -96,13 +99,17 @@ class LineTracker:
         ------
         BeamBroken
             For a line that holds no reading.
+        NotReady
+            For a line of a dwell that is far from the others.
         Silence, LinkLost
         """
         with self._queue() as heard:
             if self._settings.ask:
                 await self._source.send(self._settings.ask)
             if self._settings.stream:
-                return self._mean(await self._dwell(heard, dwell_s / self._scale))
+                samples = await self._dwell(heard, dwell_s / self._scale)
+                self._must_agree(samples)
+                return self._mean(samples)
             said = await self._next(heard)
         return self._mean([said])
 
@@ -115,6 +122,17 @@ class LineTracker:
         while loop.time() < end or len(samples) < LEAST_SAMPLES:
             samples.append(await self._next(heard))
         return samples
+
+    def _must_agree(self, samples: list[Reading]) -> None:
+        centre = [statistics.median(one.xyz[axis] for one in samples) for axis in range(3)]
+        off = [math.dist(one.xyz, centre) for one in samples]
+        usual = max(statistics.median(off), self._settings.sigma_mm)
+        if max(off) > max(STRAY * usual, STRAY_MM):
+            raise NotReady(
+                f"one of the {len(samples)} lines of a dwell is {max(off):.3g} mm from the others",
+                device=self._device,
+                remedy="Keep off the SMR; check the cable, these lines have no checksum",
+            )
 
     def _mean(self, samples: list[Reading]) -> TrackerReading:
         """Mean of samples; lines that state their uncertainty state it of what does not average."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from drivers.contract import TRACKER_LAWS, Law, TrackerBench, why_not
-from drivers.errors import BeamBroken, ConnectFailed, LinkLost, Refused, Silence
+from drivers.errors import BeamBroken, ConnectFailed, LinkLost, NotReady, Refused, Silence
 from drivers.interface import Tracker
 from drivers.kind import Surroundings
 from drivers.lines.kind import KIND
@@ -194,3 +194,43 @@ def test_patterns_find_three_numbers_however_they_are_parted() -> None:
     assert fault_in("(") != ""
     assert "(?P<z>" in fault_in("(?P<x>.)(?P<y>.)")
     assert fault_in(PLAIN) == ""
+
+
+async def test_a_line_of_a_dwell_that_lost_a_digit_is_no_part_of_a_mean() -> None:
+    line = PseudoTerminal()
+    said = [SMR]
+
+    async def pump() -> None:
+        while True:
+            await asyncio.sleep(0.002)
+            line.write(f"{said.pop() if len(said) > 1 else SMR}\r\n".encode())
+
+    task = asyncio.ensure_future(pump())
+    tracker = await opener(source=line.path, link="serial")()
+    try:
+        dwell = asyncio.ensure_future(tracker.measure(20.0))
+        await asyncio.sleep(0.03)
+        said.append("-1170.4016 1087.6680 8.3035")
+        with pytest.raises(NotReady, match="77 mm from the others"):
+            await dwell
+        assert (await tracker.measure(3.0)).xyz[2] == pytest.approx(85.3035)
+    finally:
+        task.cancel()
+        await tracker.close()
+        line.close()
+
+
+@pytest.mark.parametrize("groups", [r"(?P<x>(\d+)+)", r"(?P<x>(.*)*)", r"(?P<x>(1|1.|11)*)"])
+def test_a_pattern_that_takes_for_ever_is_refused_before_it_looks(groups: str) -> None:
+    slow = groups + r" (?P<y>\d+) (?P<z>\d+)"
+    assert "too long on a line" in fault_in(slow)
+    ignore = next(one for one in KIND.settings if one.name == "ignore")
+    assert ignore.check is not None
+    assert "too long on a line" in ignore.check(slow)
+
+
+def test_usual_patterns_are_quick() -> None:
+    numbers = r"(?P<x>[-+.\d]+)\s+(?P<y>[-+.\d]+)\s+(?P<z>[-+.\d]+)"
+    for pattern in (PLAIN, rf"\S+\s+{numbers}\s*", rf".*?{numbers}.*", rf"(?:\w+ )*{numbers}"):
+        assert fault_in(pattern) == ""
+    assert LinePattern(PLAIN, "mm", ".", "").read(SMR + " " * 400) is None

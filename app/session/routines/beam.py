@@ -20,6 +20,8 @@ _SAMPLE_S = 0.05
 _SAMPLES_PER_WALL_S = 2500.0
 """A fast clock must not flood the wire."""
 _RELOCK_TRIES = 4
+_LEAST_READINGS = 4
+"""Readings that are compared before settling is given up, however long they took."""
 _SPARE_S = 5.0
 """Wall seconds beyond the tracker's own time after which settling is given up."""
 _RELOCK_WAIT_S = 0.5
@@ -125,8 +127,9 @@ async def _watch_stream(work: Work) -> str:
 async def _settled_by_readings(work: Work) -> None:
     """Without a continuous mode: short readings, until the last two agree."""
     limits = work.limits
-    begun, before = work.clock.now(), None
-    while work.clock.now() - begun <= limits.settle_timeout_s:
+    begun, before, count = work.clock.now(), None, 0
+    while count < _LEAST_READINGS or work.clock.now() - begun <= limits.settle_timeout_s:
+        count += 1
         reading = await work.tracker.measure(limits.settle_window_s)
         if before is not None:
             creep = float(np.linalg.norm(np.subtract(reading.xyz, before)))
