@@ -28,7 +28,7 @@ from bench._blind_page import INTRODUCTION, page
 from calib.discover.discovery import Refitter, discover_run, stage_of
 from calib.effects import catalogue
 from calib.errors import BadInput
-from calib.evidence.forward import Discovery, speaks_against
+from calib.evidence.forward import Discovery, hints, speaks_against
 from calib.mechanism.description import Machine
 from calib.poses.design import design_poses
 from calib.poses.readings import NestReadings
@@ -43,7 +43,8 @@ class Outcome:
 
     ``first`` is the effect that the first diagnosis names, ``found`` those that discovery has added
     and kept; ``foreseen`` one for each hidden effect, in a model that has the others; ``after`` the
-    first effect and the groups after a designed follow-up, where there was one.
+    first effect and the groups after a designed follow-up, where there was one; ``hinted`` what was
+    called for too weakly to be added.
     """
 
     case: Case
@@ -57,6 +58,7 @@ class Outcome:
     pulls: tuple[float, ...] = ()
     foreseen: tuple[Foreseen, ...] = ()
     after: tuple[str | None, tuple[tuple[str, ...], ...]] | None = None
+    hinted: tuple[str, ...] = ()
     bad: int = 0
     seconds: float = 0.0
     hidden: dict[str, float] = field(default_factory=dict)
@@ -112,6 +114,7 @@ def solve(case: Case) -> Outcome:
         adequate=stage_of(found, 0).diagnosis.adequate,
         first=name,
         found=last.effects,
+        hinted=hints(last.diagnosis, last.effects),
         groups=groups,
         unexplained=last.diagnosis.unexplained.significant,
         holdout_over_floor=last.run.holdout.rms_mm / last.run.holdout.floor_mm,
