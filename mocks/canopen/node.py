@@ -44,6 +44,8 @@ class StationNode(canopen.LocalNode):
         self._heard: float | None = None
         self._looked = time.monotonic()
         self._consumed = 0
+        self.behind: Callable[[], bool] = bool
+        """Whether frames have come that no node has been given yet."""
         base: Any = self  # the package's own methods carry no types
         base.add_read_callback(self._on_read)
         base.add_write_callback(self._on_write)
@@ -170,7 +172,7 @@ class StationNode(canopen.LocalNode):
         if not watched or watched != self._consumed or self._heard is None:
             return False
         self._heard += held_up
-        if now - self._heard <= (watched & 0xFFFF) / 1000.0:
+        if now - self._heard <= (watched & 0xFFFF) / 1000.0 or self.behind():
             return False
         self._heard = None
         return True

@@ -71,6 +71,8 @@ class CanopenStation:
             drive.readers[0x1018, 4] = partial(int, self.serials[number - 1])
         self.endpoint = SlcanEndpoint(self._receive, host, port)
         self._bus.endpoint = self.endpoint
+        for node in self.nodes:
+            node.behind = lambda: self.endpoint.behind
         self._wake = threading.Event()
         self._stopping = False
         self._thread = threading.Thread(target=self._run, name="canopen-station", daemon=True)

@@ -10,6 +10,7 @@ adapters on one cable do.
 import contextlib
 import logging
 import os
+import select
 import socket
 import struct
 import threading
@@ -67,6 +68,8 @@ class SlcanClient:
         self.peer = peer
         self.is_open = False
         self.listens_only = False
+        self.at_work = False
+        """Whether what it has sent is being taken in."""
         self._lock = threading.Lock()
         self._closing = threading.Lock()
         self._ended = False
@@ -170,6 +173,18 @@ class SlcanEndpoint:
         for client in clients:
             client.send(line)
 
+    @property
+    def behind(self) -> bool:
+        """Whether a client has sent what is not taken in yet: a busy computer, no silent client."""
+        with self._lock:
+            clients = list(self._clients)
+        if not clients or any(client.at_work for client in clients):
+            return bool(clients)
+        try:
+            return bool(select.select([client.connection for client in clients], [], [], 0)[0])
+        except (OSError, ValueError):  # one was closed meanwhile
+            return True
+
     def _accept(self) -> None:
         while not self._stopping:
             try:
@@ -194,12 +209,14 @@ class SlcanEndpoint:
                 break
             if not received:
                 break
+            client.at_work = True
             *lines, pending = (pending + received).split(CR)
             if len(pending) > LONGEST_LINE:
                 client.send(BELL)
                 pending = b""
             for line in lines:
                 self._line(client, line)
+            client.at_work = False
         client.close()
         with self._lock:
             if client in self._clients:

@@ -1,9 +1,11 @@
 """The slcan adapter: text that real adapters speak, on a real socket."""
 
 import socket
+import threading
 from collections.abc import Iterator
 
 import pytest
+from canopen_bench import until
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -127,3 +129,19 @@ def test_reset_is_seen_as_a_reset(endpoint: SlcanEndpoint, terminal: Terminal):
     endpoint.cut(reset=True)
     with pytest.raises(ConnectionResetError):
         terminal.read(1)
+
+
+async def test_what_a_client_has_sent_is_no_silence_while_it_waits_to_be_taken_in() -> None:
+    taken = threading.Event()
+    endpoint = SlcanEndpoint(lambda _frame: taken.wait(10.0) and None, "127.0.0.1", 0)
+    endpoint.start()
+    try:
+        assert not endpoint.behind
+        with socket.create_connection(endpoint.address) as client:
+            client.sendall(b"O\rt701105\r")
+            await until(lambda: endpoint.behind)
+            taken.set()
+            await until(lambda: not endpoint.behind)
+    finally:
+        taken.set()
+        endpoint.stop()
