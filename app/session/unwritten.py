@@ -1,5 +1,6 @@
 """A disk that is full, or gone, in the middle of a session: a fault like any other, in words."""
 
+import errno
 import sqlite3
 import sys
 from pathlib import Path
@@ -18,11 +19,19 @@ UNWRITTEN = (sqlite3.Error, OSError)
 def unwritten(error: Exception, folder: Path) -> DeviceError:
     """Say that a session cannot be written any more, and how it goes on."""
     why = getattr(error, "strerror", None) or str(error)
+    mend = "Let this user write there" if _forbidden(error) else "Make room on it"
     return DeviceError(
         f"the session cannot be written: {why}",
         device="disk",
-        remedy=f"Make room on it, then: pkmcal resume {folder}; what was read until now is kept",
+        remedy=f"{mend}, then: pkmcal resume {folder}; what was read until now is kept",
     )
+
+
+def _forbidden(error: Exception) -> bool:
+    """Whether a disk, a folder or a file may only be read."""
+    if isinstance(error, OSError):
+        return error.errno in (errno.EACCES, errno.EPERM, errno.EROFS)
+    return "readonly" in str(error)
 
 
 def export_at_end(site: Site, plan: Plan, journal: Journal, folder: Path) -> None:

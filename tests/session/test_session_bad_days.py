@@ -1,7 +1,9 @@
 """Everything that can go wrong on a measuring day, through the wires: safe, said, nothing lost."""
 
 import asyncio
+import errno
 from collections.abc import Callable
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from app.session import events as ev
 from app.session.journal import Journal
 from app.session.plans import PlanOptions, measure_plan
 from app.session.session import Session
+from app.session.unwritten import unwritten
 from drivers.errors import (
     DeviceError,
     DriveFault,
@@ -394,3 +397,49 @@ async def test_a_full_disk_is_a_sentence_and_the_session_goes_on_when_there_is_r
     assert heard.of(ev.Fault)[-1].safe
     assert not mock.hands("truth")["moving"]
     assert await run(await resumed(session)) == 14
+
+
+async def test_a_folder_that_becomes_read_only_is_a_sentence_and_the_session_goes_on_later(
+    mock_of: Callable[..., Mock], tmp_path: Path, heard: Heard
+) -> None:
+    mock = mock_of("--smrs", "3")
+    session = begin(mock, tmp_path, heard)
+
+    def forbid(event: ev.Event) -> None:
+        if isinstance(event, ev.ReadingTaken) and event.pose_label == "a":
+            session.journal._db.execute("PRAGMA query_only = 1")  # SQLITE_READONLY from now on
+
+    session.observers.watch(forbid)
+    with pytest.raises(DeviceError, match="readonly") as forbidden:
+        await run(session)
+    assert "Let this user write there, then: pkmcal resume" in forbidden.value.remedy
+    assert not mock.hands("truth")["moving"]
+    assert await run(await resumed(session)) == 14
+
+
+def test_what_may_not_be_written_is_told_from_what_has_no_room(tmp_path: Path) -> None:
+    full = unwritten(OSError(errno.ENOSPC, "No space left on device"), tmp_path)
+    forbidden = unwritten(PermissionError(errno.EROFS, "Read-only file system"), tmp_path)
+    assert full.remedy.startswith("Make room on it, then")
+    assert forbidden.remedy.startswith("Let this user write there, then")
+
+
+async def test_a_clock_that_is_set_back_in_the_middle_changes_no_time_of_a_run(
+    mock_of: Callable[..., Mock], tmp_path: Path, heard: Heard
+) -> None:
+    mock = mock_of("--smrs", "3")
+    session = begin(mock, tmp_path, heard)
+    told = session.station.clock._utc
+
+    def set_back(event: ev.Event) -> None:
+        if isinstance(event, ev.ReadingTaken) and event.pose_label == "a":
+            session.station.clock._utc = lambda: told() - timedelta(hours=3.0)
+
+    session.observers.watch(set_back)
+    assert await run(session) == 14
+    journal = Journal(session.folder / "journal.sqlite", read_only=True)
+    times = [row.time_s for row in journal.rows()]
+    utc = [entry[0] for entry in journal.log()]
+    journal.close()
+    assert times == sorted(times)
+    assert utc != sorted(utc)
