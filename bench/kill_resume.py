@@ -1,25 +1,34 @@
-"""Measurements killed (kill -9) at random moments: is every reading there exactly once?
+"""Jobs killed (kill -9) at random moments: is every reading there exactly once?
+
+    python -m bench kill_resume [--kills 50] [--seed 1] [--of measure | verify | auto | mock]
 
 A mock station, sessions of six poses in three nests; each process is killed after a random time,
 until it comes through, again and again until there were enough kills. After every kill what the
 journal held must still be there in the same order; at the end of each session every planned
-reading must be there once, and the exported run must load.
+reading must be there once, and the exported run must load. ``verify``: its answer must be there as
+well. ``auto``: every decision too, and none is taken twice. ``mock``: the station is killed and
+started anew while a measurement runs, which must end by itself, with a typed fault (exit code 3).
 """
 
 import argparse
+import contextlib
 import json
 import os
 import random
+import socket
 import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
+from app.auto.journal import Decisions
 from app.files.pose_table import poses_text
 from app.files.runs import read_run
+from app.jobs.verifying import VERDICT
 from app.session.folder import read_folder
 from app.session.journal import Journal
 from app.session.within import JOURNAL
@@ -33,7 +42,10 @@ POSES = {
     "e": (-4.0, -4.0, 226.0, 0.02, 0.02, 0.12),
     "f": (2.0, 3.0, 214.0, -0.04, -0.04, 0.0),
 }
-LONGEST_S = 4.0
+HOST = "127.0.0.1"
+LONGEST_S = {"measure": 4.0, "verify": 4.0, "auto": 20.0, "mock": 4.0}
+"""Until a kill at the latest, by what is killed."""
+ALONE_S = 150.0
 
 
 def program(*arguments: str) -> list[str]:
@@ -58,52 +70,145 @@ def steps_of(folder: Path, steps: Iterable[str]) -> list[object]:
         journal.close()
 
 
-def killed(arguments: list[str], folder: Path, after_s: float) -> bool:
-    """Run the program, kill it after a time; False if it had come through before."""
-    process = subprocess.Popen(
-        program(*arguments), cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
-    )
+def ended(process: "subprocess.Popen[bytes]", within_s: float, codes: tuple[int, ...]) -> int:
+    """The exit code of a program that ends by itself; anything but these codes is a finding."""
     try:
-        _, said = process.communicate(timeout=after_s)
+        _, said = process.communicate(timeout=within_s)
     except subprocess.TimeoutExpired:
         process.kill()
-        process.communicate()
+        raise SystemExit(f"HANGS: no end within {within_s:g} s") from None
+    words = said.decode("utf-8", "replace")
+    if process.returncode not in codes or "Traceback" in words:
+        raise SystemExit(f"the program ended with {process.returncode}: {words}")
+    return process.returncode
+
+
+class Station:
+    """A mock at ports of its own, which may be killed and started anew with the same memory."""
+
+    def __init__(self, folder: Path, scale: float) -> None:
+        self._folder = folder
+        with contextlib.ExitStack() as stack:
+            taken = [stack.enter_context(socket.create_server((HOST, 0))) for _ in range(3)]
+            ports = [str(one.getsockname()[1]) for one in taken]
+        names = ("--controller-port", "--tracker-port", "--control-port")
+        self._command = [
+            sys.executable, "-m", "mocks.station", "hexapod", "--smrs", "3", "--json",
+            "--scale", str(scale), "--site", str(folder / "site.toml"), "--until-stdin-closes",
+            "--nvm", str(folder / "memory.json"),
+            *[word for pair in zip(names, ports, strict=True) for word in pair],
+        ]  # fmt: skip
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        """Switch it on."""
+        pipe = subprocess.PIPE
+        self._process = subprocess.Popen(self._command, stdin=pipe, stdout=pipe)
+        assert self._process.stdout is not None
+        json.loads(self._process.stdout.readline())
+
+    def kill(self) -> None:
+        """The end without a word."""
+        assert self._process is not None
+        self._process.kill()
+        self._process.communicate()
+
+    def stop(self) -> None:
+        """Switch it off."""
+        assert self._process is not None
+        self._process.communicate(timeout=20)
+
+
+@dataclass
+class Killer:
+    """Runs programs in a folder and kills them, or the station, while there are kills left."""
+
+    folder: Path
+    station: Station
+    dice: random.Random
+    left: int
+    of: str
+
+    def comes_through(self, arguments: list[str]) -> bool:
+        """Run the program; whether it came to its end. With kills left it may be killed."""
+        process = subprocess.Popen(
+            program(*arguments), cwd=self.folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        )
+        if not self.left:
+            ended(process, ALONE_S, (0,))
+            return True
+        after_s = self.dice.uniform(0.3, LONGEST_S[self.of])
+        try:
+            _, said = process.communicate(timeout=after_s)
+        except subprocess.TimeoutExpired:
+            self.left -= 1
+            if self.of == "mock":
+                self.station.kill()
+                code = ended(process, ALONE_S, (0, 3))
+                self.station.start()
+                return code == 0
+            process.kill()
+            process.communicate()
+            return False
+        if process.returncode:
+            raise SystemExit(f"the program ended with {process.returncode}: {said.decode()}")
         return True
-    if process.returncode:
-        raise SystemExit(f"the program ended with {process.returncode}: {said.decode()}")
-    return False
 
 
-def one_session(folder: Path, begin: list[str], dice: random.Random, kills_left: int) -> int:
-    """Measure with kills until the session comes through; returns how many kills there were."""
-    root = folder / "sessions"
+def one_session(killer: Killer, begin: list[str]) -> None:
+    """A session with kills until it comes through."""
+    root = killer.folder / "sessions"
     before: list[tuple[str, float]] = []
-    kills = 0
     known = set(root.glob("2*"))
     session: Path | None = None
-    while True:
-        arguments = ["resume", str(session)] if session else begin
-        patience = dice.uniform(0.3, LONGEST_S) if kills < kills_left else 120.0
-        was_killed = killed(arguments, folder, patience)
+    through = False
+    while not through:
+        through = killer.comes_through(["resume", str(session)] if session else begin)
         session = session or next(iter(set(root.glob("2*")) - known), None)
-        kills += was_killed
         if session is not None:
             now = held(session)
             if now[: len(before)] != before:
                 raise SystemExit(f"LOST: {session} held {before[-3:]}, now {now[-3:]}")
             before = now
-        if not was_killed:
-            break
     assert session is not None
+    must_be_whole(session)
+    if killer.of == "verify":
+        said = json.loads((session / VERDICT).read_text("utf-8"))
+        if said["poses"] != len(POSES):
+            raise SystemExit(f"THE ANSWER MISSES POSES: {session}: {said['poses']}")
+
+
+def one_flight(killer: Killer, number: int) -> None:
+    """An autopilot with kills until it comes to its end: no decision lost, none taken twice."""
+    folder = killer.folder / f"auto-{number}"
+    begin = ["auto", "--site", "site.toml", "--target-um", "25", "--first", "12", "--hours", "4"]
+    begin += ["--out", str(folder), "--unattended"]
+    before: list[object] = []
+    through = False
+    while not through:
+        through = killer.comes_through(begin)
+        now: list[object] = list(Decisions(folder).lines) if folder.exists() else []
+        if now[: len(before)] != before:
+            raise SystemExit(f"LOST: {folder} held {before[-1]}, now {now[-1:]}")
+        before = now
+    numbers = [line["number"] for line in Decisions(folder).of("decided")]
+    if numbers != list(range(1, len(numbers) + 1)):
+        raise SystemExit(f"DECISIONS NOT ONCE EACH: {folder}: {numbers}")
+    for session in (folder / "sessions").glob("2*"):
+        must_be_whole(session)
+
+
+def must_be_whole(session: Path) -> None:
+    """Every planned reading is there once, in the journal and in the run."""
     _, plan = read_folder(session)
     wanted = [step.id for step in plan.steps if step.kind.name in ("read", "reference")]
-    if sorted(step for step, _ in before) != sorted(wanted):
-        found = Counter(step for step, _ in before)
+    there = [step for step, _ in held(session)]
+    if sorted(there) != sorted(wanted):
+        found = Counter(there)
         lacking = {step: found[step] for step in {*wanted, *found} if found[step] != 1}
         raise SystemExit(f"NOT ONCE EACH: {session}: {lacking}; {steps_of(session, lacking)}")
     if sum(bool(nest) for nest in read_run(session / "run").run.nest) != len(wanted):
         raise SystemExit(f"THE RUN MISSES READINGS: {session}")
-    return kills
 
 
 def main() -> None:
@@ -111,43 +216,39 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kills", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--of", choices=tuple(LONGEST_S), default="measure")
     parser.add_argument("--scale", type=float, default=300.0)
     parser.add_argument("--seconds", type=float, default=300.0)
     parser.add_argument("--page", action="store_true")
     options = parser.parse_args()
     until = time.monotonic() + options.seconds
-    dice = random.Random(options.seed)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         os.environ["PKMCAL_STATE"] = str(folder / "state")
         (folder / "poses.csv").write_text(poses_text(POSES), encoding="utf-8")
-        station = subprocess.Popen(
-            [
-                sys.executable, "-m", "mocks.station", "hexapod", "--smrs", "3", "--json",
-                "--scale", str(options.scale), "--site", str(folder / "site.toml"),
-                "--until-stdin-closes",
-            ],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        )  # fmt: skip
-        assert station.stdin is not None
-        assert station.stdout is not None
-        json.loads(station.stdout.readline())
-        begin = ["measure", "--site", "site.toml", "--poses", "poses.csv", "--unattended"]
-        begun, kills, sessions = time.monotonic(), 0, 0
+        station = Station(folder, options.scale)
+        station.start()
+        killer = Killer(folder, station, random.Random(options.seed), options.kills, options.of)
+        verb = "verify" if options.of == "verify" else "measure"
+        begin = [verb, "--site", "site.toml", "--poses", "poses.csv", "--unattended"]
+        begun, jobs = time.monotonic(), 0
         try:
-            while kills < options.kills and time.monotonic() < until:
-                kills += one_session(folder, begin, dice, options.kills - kills)
-                sessions += 1
+            while killer.left and time.monotonic() < until:
+                jobs += 1
+                if options.of == "auto":
+                    one_flight(killer, jobs)
+                else:
+                    one_session(killer, begin)
         finally:
-            station.stdin.close()
-            station.wait(timeout=20)
-            station.stdout.close()
-    spent = time.monotonic() - begun
-    ran, says = f"{kills} kills in {sessions} sessions", "nothing lost, nothing counted twice"
+            station.stop()
+    spent, kills = time.monotonic() - begun, options.kills - killer.left
+    whom = "the mock in sessions of measure" if options.of == "mock" else options.of
+    what = "autopilots" if options.of == "auto" else "sessions"
+    ran, says = f"{kills} kills in {jobs} {what}", "nothing lost, nothing counted twice"
     print(f"{ran}, {spent:.0f} s, seed {options.seed}: {says}")
     if options.page:
-        command = f"kill_resume --kills {options.kills} --seed {options.seed}"
-        write_row("kills", Row(command, f"{ran} of measure and resume", says))
+        command = f"kill_resume --of {options.of} --kills {options.kills} --seed {options.seed}"
+        write_row("kills", Row(command, f"{ran}, {whom}", says))
 
 
 if __name__ == "__main__":
