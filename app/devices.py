@@ -6,13 +6,13 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Literal
 
 from calib.errors import BadInput
-from drivers.kind import CONTROLLERS, TRACKERS, Kind
+from drivers.kind import CONTROLLERS, GAUGES, TRACKERS, Kind
 
-Role = Literal["controller", "tracker"]
-GROUPS: dict[Role, str] = {"controller": CONTROLLERS, "tracker": TRACKERS}
+Role = Literal["controller", "tracker", "gauge"]
+GROUPS: dict[Role, str] = {"controller": CONTROLLERS, "tracker": TRACKERS, "gauge": GAUGES}
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=3)
 def _found(role: Role) -> dict[str, EntryPoint]:
     return {point.name: point for point in sorted(entry_points(group=GROUPS[role]))}
 

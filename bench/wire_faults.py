@@ -113,6 +113,10 @@ def read(folder: Path) -> dict[str, Place]:
         journal.close()
 
 
+WHERE = {"tracker": "tracker_there", "controller": "controller"}
+"""Where a site keeps what is on a link."""
+
+
 def behind(site: Site, link: str, dice: random.Random) -> tuple[Site, Proxy]:
     """The site with a proxy in one of its links."""
     part = site.tracker if link == "tracker" else site.controller
@@ -124,7 +128,7 @@ def behind(site: Site, link: str, dice: random.Random) -> tuple[Site, Proxy]:
     proxy = Proxy(far, dice)
     settings = {**part.settings, key: value.replace(far, proxy.address)}
     changed = replace(part, settings=settings, address=part.address.replace(far, proxy.address))
-    return replace(site, **{link: changed}), proxy
+    return replace(site, **{WHERE[link]: changed}), proxy
 
 
 def over_tcp(file: Path, port: int) -> Site:

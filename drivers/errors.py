@@ -15,6 +15,7 @@
     |-- MeasurementError        a reading could not be taken
     |   |-- BeamBroken          the beam was interrupted; no reading was made
     |   |-- NotReady            the tracker is not initialised, warm or stable
+    |   |-- NoNumber            an instrument of one number shows none: out of its range, an error
     |   `-- NoTarget            no reflector where one was expected
     `-- ParameterError          the controller's parameters are not what they should be
 """
@@ -97,6 +98,10 @@ class NotReady(MeasurementError):
 
 class NoTarget(MeasurementError):
     """No reflector where one was expected."""
+
+
+class NoNumber(MeasurementError):
+    """An instrument of one number shows none: out of its range, or an error of its own."""
 
 
 class ParameterError(DeviceError):

@@ -277,3 +277,59 @@ class Tracker(Protocol):
 
     async def close(self) -> None:
         """Release the link; never raises."""
+
+
+@dataclass(frozen=True)
+class GaugeReading:
+    """One number (mm, or rad where it measures an angle), and what was sent or typed for it."""
+
+    value: float
+    said: str = ""
+
+
+@dataclass(frozen=True)
+class GaugeState:
+    """What is known of an instrument of one number: whether it says any, and what it said last."""
+
+    ready: bool
+    last: str = ""
+
+
+@dataclass(frozen=True)
+class GaugeCan:
+    """What an instrument of one number offers.
+
+    ``repeats``: it can be read as often as one likes, so that several readings show whether it
+    rests; else somebody makes each, by a key or by typing. ``by_hand``: a person reads it off.
+    """
+
+    repeats: bool = True
+    by_hand: bool = False
+
+
+class Gauge(Protocol):
+    """An instrument that gives one number: dial gauge, touch probe, ball bar, inclinometer."""
+
+    identity: Identity
+    can: GaugeCan
+
+    def on_alarm(self, callback: Callable[[Alarm], None]) -> None:
+        """Call ``callback`` in the event loop for everything said unasked."""
+
+    def check(self) -> None:
+        """Raise the fault that is standing, if any."""
+
+    async def state(self) -> GaugeState:
+        """Read a snapshot."""
+
+    async def read(self, dwell_s: float) -> GaugeReading:
+        """Read the number, of a stream the mean over ``dwell_s``.
+
+        Raises NoNumber where it shows none, and LinkError where nothing comes.
+        """
+
+    async def stop(self) -> None:
+        """End a reading that is waited for; never raises for a second call."""
+
+    async def close(self) -> None:
+        """Release the link; never raises."""

@@ -1,6 +1,6 @@
 """What a kind of device is: its name in the site file, its settings, and how it is opened.
 
-A driver is a package that offers a :class:`Kind` by an entry point of one of two groups; those
+A driver is a package that offers a :class:`Kind` by an entry point of one of three groups; those
 that ship with the program are found the same way::
 
     [project.entry-points."pkmcal.trackers"]
@@ -15,10 +15,11 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Generic, Literal, TypeVar
 
-from drivers.interface import MotionController, Motors, PoseMover, Tracker
+from drivers.interface import Gauge, MotionController, Motors, PoseMover, Tracker
 
 CONTROLLERS: Final = "pkmcal.controllers"
 TRACKERS: Final = "pkmcal.trackers"
+GAUGES: Final = "pkmcal.gauges"
 
 Form = Literal[
     "text", "whole", "number", "numbers", "flag", "words", "address", "file", "files", "table"
@@ -148,7 +149,7 @@ class Surroundings:
     struts: tuple[Strut, ...] = ()
 
 
-DeviceT = TypeVar("DeviceT", MotionController, Motors, PoseMover, Tracker)
+DeviceT = TypeVar("DeviceT", MotionController, Motors, PoseMover, Tracker, Gauge)
 
 Takes = Literal["parameters", "actuators", "poses"]
 """What a controller takes: parameters and poses, or actuator values alone, or poses alone."""

@@ -5,6 +5,8 @@ from pathlib import Path
 
 MACHINES = ("hexapod", "tripod", "ptm")
 """Machines that there are mocks of."""
+GAUGES = ("dial", "bar")
+"""Gauges that there are mocks of."""
 WITH_OWN_FILES = ("hexapod", "ptm")
 """Mechanisms whose mock takes a machine file of one's own: those with a controller on CANopen."""
 
@@ -43,6 +45,10 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--geocom", action="store_true",
         help="the tracker is a total station that speaks GeoCOM (kind geocom)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--gauge", choices=GAUGES,
+        help="no tracker: a dial gauge on a plate, or a ball bar between nests, on a line",
     )  # fmt: skip
     parser.add_argument(
         "--pose", action="store_true",

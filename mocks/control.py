@@ -9,6 +9,8 @@ that is false, ``error`` in words.
 carry               nest (or "birdbath", "hand"), smr = 1, follow = true (keep the beam on it)
 place               nests = [..]: SMR 1, 2, .. into these nests
 where               answers where every SMR is
+span                nest, nest2: the bar between a nest of the platform and one of the base
+take-off            the bar is taken off
 swap-smr            smr, off_mm: take one of another diameter
 exchange            first, second: two SMRs change places
 break-beam          for_s (machine s; without: until restore-beam), status
@@ -37,6 +39,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from mocks.gauge import GaugeMock
 from mocks.physics.pose import rpy_from_rotation
 from mocks.tracker.instrument import BEAM_BROKEN_STATUS
 from mocks.tracker.server import TrackerServer
@@ -60,13 +63,20 @@ class Hands:
     """Carries out the commands of the control socket; raises ValueError for what it cannot."""
 
     def __init__(
-        self, world: World, tracker: TrackerServer, controller: Cuttable | None = None
+        self,
+        world: World,
+        tracker: TrackerServer,
+        controller: Cuttable | None = None,
+        gauge: GaugeMock | None = None,
     ) -> None:
         self._world, self._tracker, self._controller = world, tracker, controller
         self._instrument = tracker.instrument
+        self._gauge = gauge
         self._commands: dict[str, Callable[[Arguments], Any]] = {
             "carry": self._carry,
             "place": self._place,
+            "span": self._span,
+            "take-off": self._take_off,
             "where": lambda a: {"places": world.smrs.places},
             "swap-smr": lambda a: world.smrs.swap_for_other(_smr(a["smr"]), float(a["off_mm"])),
             "exchange": lambda a: world.smrs.exchange(_smr(a["first"]), _smr(a["second"])),
@@ -117,6 +127,17 @@ class Hands:
             self._world.smrs.put(_smr(index + 1), "hand")
         for index, nest in enumerate(nests):
             self._world.smrs.put(_smr(index + 1), nest)
+
+    def _span(self, a: Arguments) -> None:
+        self._bar().span(str(a["nest"]), str(a["nest2"]))
+
+    def _take_off(self, a: Arguments) -> None:
+        self._bar().between = None
+
+    def _bar(self) -> GaugeMock:
+        if self._gauge is None:
+            raise ValueError("this station has no gauge")
+        return self._gauge
 
     def _break_beam(self, a: Arguments) -> None:
         self._instrument.break_beam(int(a.get("status", BEAM_BROKEN_STATUS)))

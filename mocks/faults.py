@@ -30,6 +30,13 @@ Names, with what reads them:
 ``tracker-no-result``                   StartMeasurement is answered, the result never comes
 ``tracker-result-unstable``             the result comes with status NoStationaryResult
 ``tracker-unsolicited-error``           one-shot: an Error packet with command Unknown
+``gauge-silent``                        the gauge answers nothing: its battery
+``gauge-held``                          the gauge answers its last number again and again
+``gauge-over``                          the gauge is out of its range
+``gauge-noise``                         every other line of the gauge is garbage
+``gauge-inch``                          somebody has switched the gauge to inches; its lines say so
+``gauge-inch-untold``                   the same, and its lines have no unit
+``gauge-reversed``                      the gauge counts the other way
 ``jammed``                              set by the machine itself: the legs could not close
 ``misplace:NEST``                       one-shot: the next SMR carried ends in NEST instead
 ======================================  ==========================================================

@@ -33,6 +33,7 @@ from mocks.canopen.bare_site import bare_site
 from mocks.canopen.server import CanopenStation
 from mocks.clock import ScaledClock
 from mocks.control import ControlServer, Hands
+from mocks.gauge import GaugeMock, GaugeServer
 from mocks.gcs.server import GcsStation
 from mocks.geocom.instrument import SERIAL as STATION_SERIAL
 from mocks.geocom.server import GeoComServer
@@ -82,6 +83,7 @@ class MockStation:
         own: OwnFiles | None = None,
         linuxcnc: Path | None = None,
         geocom: bool = False,
+        gauge: str | None = None,
     ) -> None:
         self.world = world
         self.clock = clock
@@ -101,7 +103,11 @@ class MockStation:
         self.tracker = TrackerServer(world, clock, host, ports[1])
         self.lines = LineServer(world, clock, host) if lines else None
         self.total_station = GeoComServer(world, clock, host) if geocom else None
-        self.control = ControlServer(Hands(world, self.tracker, self.controller), host, ports[2])
+        self.gauge = GaugeServer(GaugeMock(world, clock, gauge), host) if gauge else None
+        hands = Hands(
+            world, self.tracker, self.controller, self.gauge.gauge if self.gauge else None
+        )
+        self.control = ControlServer(hands, host, ports[2])
 
     async def start(self) -> None:
         """Power on."""
@@ -111,6 +117,8 @@ class MockStation:
             await self.lines.start()
         if self.total_station is not None:
             await self.total_station.start()
+        if self.gauge is not None:
+            await self.gauge.start()
         await self.control.start()
 
     async def stop(self) -> None:
@@ -120,6 +128,8 @@ class MockStation:
             await self.lines.stop()
         if self.total_station is not None:
             await self.total_station.stop()
+        if self.gauge is not None:
+            await self.gauge.stop()
         await self.tracker.stop()
         await asyncio.to_thread(self.controller.stop)
 
@@ -188,7 +198,7 @@ class MockStation:
             "title": f"mock {self.world.machine.name}, seed {plan.seed}",
             "machine": str(self.own.machine) if self.own else self.world.machine.name,
             "controller": {"serial": str(self.serial), **self._controller_site()},
-            "tracker": {**self._tracker_site(), "frame": self._rough_frame()},
+            **self._measuring(),
             "nests": {
                 "platform": {k: list(v) for k, v in around.platform_nests.items()},
                 "base": {k: list(v) for k, v in around.base_nests.items()},
@@ -207,6 +217,12 @@ class MockStation:
             **({} if self.total_station is None else {"limits": dict(STATION_LIMITS)}),
             "clock": {"scale": self.clock.scale},
         }  # fmt: skip
+
+    def _measuring(self) -> dict[str, Any]:
+        """What measures: the tracker, or a gauge instead."""
+        if self.gauge is not None:
+            return self.gauge.site()
+        return {"tracker": {**self._tracker_site(), "frame": self._rough_frame()}}
 
     def _told_payload(self) -> dict[str, float]:
         """The payload that somebody has weighed, where no controller tells it."""
@@ -271,7 +287,7 @@ def build(options: argparse.Namespace) -> MockStation:
         raise ValueError("LinuxCNC (--linuxcnc) moves a hexapod, and holds its parameters itself")
     return MockStation(
         world, clock, options.nvm, ports, options.serial, options.lines, options.pose,
-        options.bare, own, options.linuxcnc, options.geocom,
+        options.bare, own, options.linuxcnc, options.geocom, options.gauge,
     )  # fmt: skip
 
 

@@ -146,6 +146,10 @@ class World:
             nest, times, self.pose(times) if nest in self.around.platform_nests else None
         )
 
+    def nest_in_base(self, nest: str, times: Array) -> Array:
+        """Where a nest of the platform really is at ``times`` (N,), base frame, (N, 3), mm."""
+        return np.asarray(self.pose(times).points(np.array(self.around.platform_nests[nest])))
+
     def _smr_at(self, smr: str, place: str, times: Array, pose: Pose | None) -> Array:
         if place == BIRDBATH:
             return np.tile(HOME_REFLECTOR, (times.size, 1))

@@ -1,7 +1,7 @@
 """A station for asynchronous scripts: its devices stay connected from one job to the next."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 from types import TracebackType
@@ -122,6 +122,7 @@ class AsyncStation:
         cycles: int = 1,
         warm_up: bool = True,
         title: str = "",
+        pairs: Sequence[tuple[str, str]] = (),
     ) -> SessionReport:
         """Measure poses; see :meth:`Station.measure`."""
         at_least(1, reference_every=reference_every, cycles=cycles)
@@ -134,6 +135,7 @@ class AsyncStation:
             cycles=cycles,
             warm_up=warm_up,
             title=title,
+            pairs=pairs,
             station=self._connection,
             unattended=self._operator is None,
         )

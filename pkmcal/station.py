@@ -2,7 +2,7 @@
 
 import asyncio
 import threading
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from concurrent import futures
 from types import TracebackType
 from typing import Any, Self, TypeVar
@@ -133,8 +133,9 @@ class Station:
         cycles: int = 1,
         warm_up: bool = True,
         title: str = "",
+        pairs: Sequence[tuple[str, str]] = (),
     ) -> SessionReport:
-        """Visit all poses with an SMR in each nest and write the readings as a run.
+        """Visit all poses with an SMR in each nest, or read a gauge there, and write a run.
 
         Parameters
         ----------
@@ -151,6 +152,8 @@ class Station:
             Wait until temperatures are steady.
         title : str
             Title of the run.
+        pairs : sequence of (str, str)
+            With a gauge that reads distances: labels of two poses, where the tool leaves marks.
 
         Returns
         -------
@@ -176,6 +179,7 @@ class Station:
                 cycles=cycles,
                 warm_up=warm_up,
                 title=title,
+                pairs=pairs,
             )
         )
 

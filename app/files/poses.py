@@ -3,7 +3,7 @@
 The format is described in docs/poses-file.md.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,8 @@ class PoseFile:
     labels: tuple[str, ...]
     pose_set: PoseSet
     design: Mapping[str, Any]
+    pairs: tuple[tuple[str, str], ...] = ()
+    """Poses between whose marks calipers measure."""
 
     @property
     def by_label(self) -> dict[str, Pose]:
@@ -88,7 +90,7 @@ def pose_file_of(top: TomlTable, source: str, machine: Machine) -> PoseFile:
     title = top.text("title", "")
     notes = top.named("design", required=False)
     design = {key: notes.raw(key) for key in notes}
-    poses = top.named("poses")
+    poses, pairs = top.named("poses"), top.texts("pairs")
     top.end()
     labels = tuple(poses.names())
     if not labels:
@@ -102,8 +104,31 @@ def pose_file_of(top: TomlTable, source: str, machine: Machine) -> PoseFile:
     pose_set = solve_poses(machine, task)
     _check_reach(pose_set, labels, poses)
     _check_q(pose_set, labels, poses)
+    marks = _pairs(top, pairs, labels)
     faults.end()
-    return PoseFile(source, title, labels, pose_set, design)
+    return PoseFile(source, title, labels, pose_set, design, marks)
+
+
+def _pairs(
+    top: TomlTable, texts: Sequence[str], labels: tuple[str, ...]
+) -> tuple[tuple[str, str], ...]:
+    """Pairs of labels, each ``"A:B"``."""
+    found = []
+    for text in texts:
+        one, _, two = text.partition(":")
+        if one not in labels or two not in labels or one == two:
+            top.complain(
+                f'"{text}" is no pair of poses', "pairs", remedy='Write pairs = ["p01:p07"]'
+            )
+        found.append((one, two))
+    return tuple(found)
+
+
+def read_marks(path: Path, machine: Machine) -> tuple[tuple[str, str], ...]:
+    """The pairs of marks of a poses file; none of a bare table."""
+    if path.suffix.lower() == ".csv":
+        return ()
+    return read_pose_file(path, machine).pairs
 
 
 def _coordinates(poses: TomlTable, label: str, machine: Machine) -> list[float]:
@@ -143,11 +168,19 @@ def _check_q(pose_set: PoseSet, labels: tuple[str, ...], poses: TomlTable) -> No
 
 
 def render_pose_file(
-    labels: tuple[str, ...], pose_set: PoseSet, title: str, design: Mapping[str, Any], comment: str
+    labels: tuple[str, ...],
+    pose_set: PoseSet,
+    title: str,
+    design: Mapping[str, Any],
+    comment: str,
+    pairs: Sequence[str] = (),
 ) -> str:
     """Text of a poses file; coordinates are written to 0.001 mm and 0.001 deg."""
     lines = [f"# {line}" for line in comment.splitlines()]
     lines += [f'format = "{FORMAT}"', f'machine = "{pose_set.machine.name}"', f'title = "{title}"']
+    if pairs:
+        lines += ["", "# Marks left at these poses, between which calipers measure."]
+        lines += [f"pairs = [{', '.join(_toml(pair) for pair in pairs)}]"]
     lines += ["", "[design]"] if design else []
     lines += [f"{key} = {_toml(value)}" for key, value in design.items()]
     lines += ["", "# Platform in the base frame, mm; q is what the nominal machine makes of it."]
@@ -160,7 +193,7 @@ def render_pose_file(
     return "\n".join(lines) + "\n"
 
 
-def render_design(design: Design, seed: int, comment: str) -> str:
+def render_design(design: Design, seed: int, comment: str, pairs: Sequence[str] = ()) -> str:
     """Text of the poses file of a design."""
     about = {
         "criterion": design.criterion,
@@ -174,7 +207,7 @@ def render_design(design: Design, seed: int, comment: str) -> str:
         "path_in_strokes": round(design.length, 2),
     }
     title = f"{len(design.labels)} poses for {design.machine.name}"
-    return render_pose_file(design.labels, design.pose_set, title, about, comment)
+    return render_pose_file(design.labels, design.pose_set, title, about, comment, pairs)
 
 
 def _decimals(pose_set: PoseSet) -> int:

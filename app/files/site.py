@@ -15,10 +15,15 @@ from app.devices import Role, kind_named, kind_names
 from app.files.device_settings import read_address, read_settings
 from app.files.machines import load_machine
 from app.files.record_details import FILES, RecordDetails, record_details
+from app.files.site_gauge import GaugeSite, read_gauge
+from app.files.site_limits import Limits, read_limits
 from app.files.text import read_text
+from calib.arrays import Array
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.runs.header import Load, load_of
+from calib.runs.sensing import Setup
+from calib.runs.setup import nests_of, planes_of
 from calib.toml_faults import Faults
 from calib.toml_table import TomlTable
 from drivers.kind import Takes
@@ -27,10 +32,6 @@ FORMAT = "pkm-site/1"
 FARTHEST_MM = 1e9
 FASTEST = 1e6
 """No mock's clock runs faster."""
-MAY_BE_ZERO = ("warm_up_s", "margin_mm")
-"""Limits of which nothing at all is a choice; with another at zero nothing could be measured."""
-LEAST_BAND_K = 1.0
-"""The air is to come back by half a kelvin into its band before the job goes on."""
 
 
 @dataclass(frozen=True)
@@ -88,34 +89,6 @@ class Hands:
 
 
 @dataclass(frozen=True)
-class Limits:
-    """What is normal here: mm, s, deg C; every one has a default."""
-
-    hole_radius_mm: float = 4.0
-    """How far from its predicted place an SMR may be seen; nests are much farther apart."""
-    settle_std_mm: float = 0.020
-    """Scatter in the settling window below which the machine stands (tracker noise included)."""
-    settle_creep_mm: float = 0.008
-    """Largest difference between the means of the window's halves."""
-    settle_window_s: float = 0.5
-    settle_timeout_s: float = 30.0
-    dwell_s: float = 3.0
-    drift_mm: float = 0.050
-    """Largest shift of the base against the first reference."""
-    base_fit_mm: float = 0.050
-    """Largest RMS of the base nests against their drawing."""
-    two_face_mm: float = 0.100
-    air_temp_C: tuple[float, ...] = (10.0, 35.0)
-    warm_up_s: float = 60.0
-    """How long the channels are watched before the run."""
-    warm_up_K_per_min: float = 0.2
-    move_timeout_s: float = 120.0
-    """Machine seconds that a move may take."""
-    margin_mm: float = 0.1
-    """Kept free at the ends of strokes when poses are chosen, beyond what tolerances need."""
-
-
-@dataclass(frozen=True)
 class Site:
     """A site file, checked."""
 
@@ -125,7 +98,6 @@ class Site:
     machine_name: str
     machine: Machine
     controller: ControllerSite
-    tracker: TrackerSite
     platform_nests: Mapping[str, tuple[float, ...]]
     base_nests: Mapping[str, tuple[float, ...]]
     load: Load | None
@@ -133,10 +105,31 @@ class Site:
     hands: Hands
     limits: Limits
     clock_scale: float
+    tracker_there: TrackerSite | None = None
+    gauge: GaugeSite | None = None
+    """What measures: one of both is there."""
+    setup: Setup | None = None
+    """Planes, and nests that are not exact, of a site with a gauge."""
     offers: tuple[Path, ...] = ()
     """Effect files that discovery has as candidates beside the catalogue."""
     controller_parameters: Mapping[str, float] = field(default_factory=dict)
     record: RecordDetails = field(default_factory=RecordDetails)
+
+    @property
+    def tracker(self) -> TrackerSite:
+        """The tracker; raises :class:`BadInput` where a gauge measures."""
+        if self.tracker_there is None:
+            raise BadInput(
+                "this needs a tracker, and the site has a gauge",
+                place=self.source,
+                remedy="Name a site with a [tracker]; with a gauge there is pkmcal measure",
+            )
+        return self.tracker_there
+
+    @property
+    def measured_by(self) -> TrackerSite | GaugeSite:
+        """What measures."""
+        return self.tracker if self.gauge is None else self.gauge
 
     def to_toml(self) -> str:
         """Render the site as a file that stands alone, for the session's folder."""
@@ -166,19 +159,30 @@ def site_of(top: TomlTable, source: str, folder: Path) -> Site:
     attempt = faults.attempt
     machine_name = top.text("machine")
     machine = attempt(lambda: _machine(top, machine_name, folder))
-    nests = top.table("nests")
-    platform, base = nests.named("platform"), nests.named("base")
-    platform_nests = {name: _centre(platform, name) for name in platform}
-    base_nests = {name: _centre(base, name) for name in base}
-    attempt(lambda: _check_nests(platform_nests, base_nests, base))
+    nests, by_gauge = top.table("nests"), top.has("gauge")
+    platform, base = nests.named("platform"), nests.named("base", required=not by_gauge)
+    setup = None
+    if by_gauge:
+        platform_nests, base_nests, setup = _places(top, platform, base)
+    else:
+        platform_nests = {name: _centre(platform, name) for name in platform}
+        base_nests = {name: _centre(base, name) for name in base}
+    attempt(lambda: _check_nests(platform_nests, base_nests, base, 0 if by_gauge else 3))
     loaded = attempt(lambda: _load(top))
     title = top.text("title", "")
     # How many actuators there are is known only of a machine that can be read.
     count = len(machine.actuators) if isinstance(machine, Machine) else None
     controller = attempt(lambda: _controller(top.table("controller"), count, folder))
-    tracker = attempt(lambda: _tracker(top.table("tracker"), count, folder))
+    tracker = gauge = None
+    if by_gauge and top.has("tracker"):
+        top.complain("a tracker and a gauge", "gauge", remedy="Name the one that is to measure")
+    if setup is not None:
+        own, places = setup, (platform_nests, base_nests)
+        gauge = attempt(lambda: read_gauge(top.table("gauge"), own.planes, places, count, folder))
+    else:
+        tracker = attempt(lambda: _tracker(top.table("tracker"), count, folder))
     hands = attempt(lambda: _hands(top.table("hands", required=False)))
-    limits = attempt(lambda: _limits(top.table("limits", required=False)))
+    limits = attempt(lambda: read_limits(top.table("limits", required=False)))
     clock_scale = attempt(lambda: _clock(top.table("clock", required=False)))
     offers = attempt(lambda: _offers(top.table("effects", required=False), folder))
     record = attempt(lambda: record_details(top.table("record", required=False), folder))
@@ -188,7 +192,8 @@ def site_of(top: TomlTable, source: str, folder: Path) -> Site:
     load, payload_kg = loaded
     return Site(
         source=source, data=_standing_alone(top, machine_name, folder), title=title,
-        machine_name=machine_name, machine=machine, controller=controller, tracker=tracker,
+        machine_name=machine_name, machine=machine, controller=controller,
+        tracker_there=tracker, gauge=gauge, setup=setup,
         platform_nests=platform_nests, base_nests=base_nests, load=load, payload_kg=payload_kg,
         hands=hands, limits=limits, clock_scale=clock_scale, offers=offers, record=record,
     )  # fmt: skip
@@ -216,7 +221,7 @@ def _standing_alone(top: TomlTable, machine_name: str, folder: Path) -> dict[str
             name: str((folder / text).resolve()) if name in FILES and text else text
             for name, text in record.items()
         }
-    roles: tuple[Role, ...] = ("controller", "tracker")
+    roles: tuple[Role, ...] = ("controller", "tracker", "gauge")
     for role in roles:
         if isinstance(own := data.get(role), dict) and isinstance(own.get("kind"), str):
             data[role] = {**own, **_absolute(own, role, folder)}
@@ -243,8 +248,23 @@ def _centre(nests: TomlTable, name: str) -> tuple[float, ...]:
     return nests.numbers(name, 3, unit="mm", most=FARTHEST_MM)
 
 
-def _check_nests(platform: Mapping[str, Any], base: Mapping[str, Any], table: TomlTable) -> None:
-    if len(base) < 3:
+def _places(
+    top: TomlTable, platform: TomlTable, base: TomlTable
+) -> tuple[dict[str, tuple[float, ...]], dict[str, tuple[float, ...]], Setup]:
+    """Centres of nests, exact or not, and what else version 2 of a run says."""
+    found: list[dict[str, tuple[float, ...]]] = []
+    spreads: dict[str, Array] = {}
+    for table in (platform, base):
+        centres, spread = nests_of(table)
+        found.append({name: tuple(float(v) for v in at) for name, at in centres.items()})
+        spreads |= spread
+    return found[0], found[1], Setup(planes=planes_of(top), nests=spreads)
+
+
+def _check_nests(
+    platform: Mapping[str, Any], base: Mapping[str, Any], table: TomlTable, least: int
+) -> None:
+    if len(base) < least:
         table.complain(f"{len(base)} base nests", remedy="At least three tie tracker and base")
     if len(platform) < 1:
         raise table.wrong("no platform nest", remedy="Give at least one in [nests.platform]")
@@ -297,37 +317,6 @@ def _hands(table: TomlTable) -> Hands:
     hands = Hands(kind, host, port, table.whole("smrs", 1, least=1), table.flag("base_smrs", True))
     table.end()
     return hands
-
-
-def _limits(table: TomlTable) -> Limits:
-    known = Limits()
-    values: dict[str, Any] = {}
-    for name in Limits.__dataclass_fields__:
-        default = getattr(known, name)
-        if isinstance(default, tuple):
-            values[name] = table.numbers(name, len(default), default, unit=_unit_in(name))
-        else:
-            above = None if name in MAY_BE_ZERO else 0.0
-            values[name] = table.number(
-                name, default, unit=_unit_in(name), above=above, least=0.0, most=math.inf
-            )
-    low, high = values["air_temp_C"]
-    if high - low <= LEAST_BAND_K:
-        table.complain(
-            f"air_temp_C is {low:g} to {high:g}: no air would ever be right",
-            "air_temp_C",
-            remedy=f"Write the lower limit first, the upper more than {LEAST_BAND_K:g} K above it",
-        )
-    table.end()
-    return Limits(**values)
-
-
-def _unit_in(name: str) -> str:
-    """The unit with which a limit's name ends."""
-    for ending, unit in {"_mm": "mm", "_K_per_min": "K/min", "_s": "s", "_C": "deg C"}.items():
-        if name.endswith(ending):
-            return unit
-    raise ValueError(f"the limit {name} names no unit")
 
 
 def _clock(table: TomlTable) -> float:

@@ -10,12 +10,13 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from app.defaults import UNITS
+from app.doubt import doubt
 from app.files.machines import load_machine
+from app.files.poses import read_marks
 from app.files.runs import HEADER
 from app.files.typed_run import TOOL, TypedRun, begin
 from app.files.wanted_poses import read_wanted
 from app.jobs.record import Report
-from app.jobs.typing_mistakes import doubt
 from calib.arrays import Array
 from calib.errors import BadInput
 from calib.mechanism.rigid import rotate
@@ -99,6 +100,8 @@ def enter(
     nest = typed.header.platform_nests[TOOL]
     wanted = read_wanted(poses, typed.machine)
     found = solve_poses(typed.machine, wanted.task)
+    if what == "calipers" and not pairs and poses.suffix.lower() == ".toml":
+        pairs = read_marks(poses, typed.machine)
     items = _items(wanted.names, found, nest, what, pairs)
     manner = _Manner(what, sigma_mm, unit, decimal, near_mm, clock)
     session = _Typing(typed, found, wanted.names, ask, tell, manner)

@@ -10,27 +10,21 @@ import numpy as np
 
 from app.files.machines import load_machine
 from app.files.pose_table import Pose, poses_text
-from app.files.poses import full_poses, nest_matrix, render_design, render_pose_file
-from app.files.site import Limits, Site, load_site
+from app.files.poses import full_poses, render_design, render_pose_file
+from app.files.site import Site, load_site
+from app.files.site_limits import Limits
 from app.jobs.chosen_runs import File, at_least
+from app.jobs.read_there import CALIPERS_SIGMA_UM, drawn_for, readings_of
 from app.jobs.record import Record, Report
 from calib.defaults import POSES_FROM
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.limits import Margin
 from calib.poses.design import TABLE, Design, design_poses
+from calib.poses.gauges import MarkPairs, choose_marks
 from calib.poses.information import Accuracy
 from calib.poses.margin import stroke_margin
-from calib.poses.readings import HAN_2020, DirectionReadings, NestReadings, PoseNoise, Readings
 from calib.poses.verification import VerificationGrid, verification_poses
-
-ANGLES = ("rx", "ry", "rz", "tilt", "azimuth")
-SITE_SIGMA_UM = 5.0
-"""Standard uncertainty per axis that is expected of a reading of a nest."""
-
-
-PROBE_SIGMA_UM = 10.0
-"""The same of a height, by a touch probe."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +71,9 @@ class KeptFreeEntry(Record):
 class PosesReport(Report):
     """Chosen poses in the order of a short path, and what they will give (``pkm-design/1``).
 
-    ``kept_free``: what a machine within tolerance needs at the ends of its actuators' ranges.
+    ``pairs``: marks between which calipers tell most (``p01:p07``), ``with_pairs``: with them
+    measured as well. ``kept_free``: what a machine within tolerance needs at the ends of its
+    actuators' ranges.
     """
 
     FORMAT: ClassVar[str] = "pkm-design/1"
@@ -91,6 +87,8 @@ class PosesReport(Report):
     random_poses: AccuracyEntry
     by_count: tuple[CountEntry, ...]
     path_in_strokes: float
+    pairs: tuple[str, ...] = ()
+    with_pairs: AccuracyEntry | None = None
     kept_free: tuple[KeptFreeEntry, ...]
     poses: tuple[PoseEntry, ...]
     _design: Design = field(repr=False, compare=False)
@@ -107,7 +105,7 @@ class PosesReport(Report):
         text = (
             poses_text(self.by_label())
             if bare
-            else render_design(self._design, self.seed, self._command)
+            else render_design(self._design, self.seed, self._command, self.pairs)
         )
         path.write_text(text, encoding="utf-8")
 
@@ -148,6 +146,8 @@ def choose_poses(
     criterion: Literal["I", "D"] = "I",
     priors: bool = True,
     heights: bool = False,
+    calipers: int = 0,
+    calipers_um: float = CALIPERS_SIGMA_UM,
     sigma_um: float | None = None,
     angle_mdeg: float | None = None,
     candidates: int = POSES_FROM,
@@ -171,6 +171,11 @@ def choose_poses(
         Use the machine file's tolerances as priors.
     heights : bool
         Only heights over the base are read: of the site's nests, or of the platform's origin.
+    calipers : int
+        So many pairs of marks are chosen as well, left by the first nest (the platform's origin
+        without a site), to be measured with calipers.
+    calipers_um : float
+        Standard uncertainty of such a distance, um.
     sigma_um, angle_mdeg : float, optional
         Standard uncertainty of a reading per axis, um, and of an angle, mdeg, where whole poses
         are read.
@@ -202,9 +207,10 @@ def choose_poses(
     here = _site(site)
     described = _machine(named, here)
     margin = _margin(described, here, margin_mm)
+    readings = readings_of(described, here, heights, sigma_um, angle_mdeg)
     found = design_poses(
         described,
-        _readings(described, here, heights, sigma_um, angle_mdeg),
+        readings,
         n,
         np.random.default_rng(seed),
         criterion=criterion,
@@ -212,7 +218,12 @@ def choose_poses(
         candidates=candidates,
         counts=[count for count in TABLE if count <= candidates],
         margin=margin,
+        draw=drawn_for(here, margin),
     )
+    marks = None
+    if calipers:
+        nest = next(iter(here.platform_nests.values())) if here else (0.0, 0.0, 0.0)
+        marks = choose_marks(found, readings, calipers, np.array(nest), calipers_um * 1e-3)
     # What brings the same poses again stands in the file.
     command = (
         f"pkmcal poses {named or described.name} --n {n} "
@@ -221,10 +232,12 @@ def choose_poses(
     command += "" if priors else " --no-priors"
     command += f" --site {here.source}" if here else ""
     command += " --heights" if heights else ""
+    command += f" --calipers {calipers} --calipers-um {calipers_um:g}" if calipers else ""
     command += f" --sigma-um {sigma_um:g}" if sigma_um is not None else ""
     command += f" --angle-mdeg {angle_mdeg:g}" if angle_mdeg is not None else ""
     command += f" --margin-mm {margin_mm:g}" if margin_mm is not None else ""
-    return PosesReport.of(_said(found, seed, margin), _design=found, _command=command)
+    said = _said(found, seed, margin, marks)
+    return PosesReport.of(said, _design=found, _command=command)
 
 
 def verification_grid(
@@ -283,33 +296,6 @@ def _machine(name: str, site: Site | None) -> Machine:
     raise BadInput("no machine is named", remedy="Write pkmcal poses hexapod, or give --site.")
 
 
-def _readings(
-    machine: Machine,
-    site: Site | None,
-    heights: bool,
-    sigma_um: float | None,
-    angle_mdeg: float | None,
-) -> Readings:
-    """Nests of the site, or whole poses with the noise of Han et al. 2020 if nothing is said."""
-    for value, what in ((sigma_um, "--sigma-um"), (angle_mdeg, "--angle-mdeg")):
-        if value is not None and value <= 0.0:
-            raise BadInput(f"{what} is {value:g}", remedy="Give a positive uncertainty.")
-    if heights:
-        if angle_mdeg is not None:
-            raise BadInput("heights have no angle", remedy="Leave --angle-mdeg out.")
-        nests = nest_matrix(site.platform_nests) if site else np.zeros((3, 1))
-        sigma = (PROBE_SIGMA_UM if sigma_um is None else sigma_um) * 1e-3
-        return DirectionReadings(nests, np.array([[0.0], [0.0], [1.0]]), sigma)
-    if site:
-        sigma = (SITE_SIGMA_UM if sigma_um is None else sigma_um) * 1e-3
-        return NestReadings(nest_matrix(site.platform_nests), sigma, nest_matrix(site.base_nests))
-    sigma = HAN_2020.position_sigma if sigma_um is None else sigma_um * 1e-3
-    if angle_mdeg is not None:
-        return PoseNoise(sigma, float(np.deg2rad(angle_mdeg * 1e-3)))
-    turns = any(name in ANGLES for name in machine.task.coordinates)
-    return PoseNoise(sigma, HAN_2020.angle_sigma if turns else None)
-
-
 def _margin(machine: Machine, site: Site | None, margin_mm: float | None) -> Margin:
     """What tolerances need, and at strokes what effects add to it where the host compensates."""
     if margin_mm is None:
@@ -326,7 +312,7 @@ def _accuracy(accuracy: Accuracy) -> dict[str, float]:
     }
 
 
-def _said(design: Design, seed: int, margin: Margin) -> dict[str, Any]:
+def _said(design: Design, seed: int, margin: Margin, marks: MarkPairs | None) -> dict[str, Any]:
     """A choice of poses as plain data."""
     names = design.machine.task.coordinates
     return {
@@ -341,6 +327,13 @@ def _said(design: Design, seed: int, margin: Margin) -> dict[str, Any]:
         "random_poses": _accuracy(design.random),
         "by_count": [{"n": n, **_accuracy(a)} for n, a in design.by_count],
         "path_in_strokes": design.length,
+        "pairs": [] if marks is None else [":".join(pair) for pair in marks.pairs],
+        "with_pairs": None
+        if marks is None
+        else {
+            "position_rms_um": marks.position_um,
+            "orientation_rms_mdeg": marks.orientation_mdeg,
+        },
         "kept_free": [
             {"actuator": actuator.name, "each_end": kept, "unit": actuator.unit}
             for actuator, kept in zip(design.machine.actuators, margin.actuators, strict=True)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from drivers.interface import Alarm, ControllerState, Identity, TrackerState
+from drivers.interface import Alarm, ControllerState, GaugeState, Identity, TrackerState
 
 Vector = tuple[float, float, float]
 
@@ -21,7 +21,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Connected(Event):
-    """A device answered; ``role`` is ``controller`` or ``tracker``."""
+    """A device answered; ``role`` is ``controller``, ``tracker`` or ``gauge``."""
 
     role: str
     identity: Identity
@@ -41,6 +41,7 @@ class DeviceStates(Event):
 
     controller: ControllerState | None
     tracker: TrackerState | None
+    gauge: GaugeState | None = None
 
 
 @dataclass(frozen=True)
@@ -147,6 +148,27 @@ class ReadingTaken(Event):
     predicted: Vector
     miss_mm: float
     sigma_mm: float
+    time_s: float
+    channels: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class NumberTaken(Event):
+    """A gauge was read, and the number is in the journal.
+
+    ``value`` and ``expected`` (by the commanded pose, and the zero as found so far) are in
+    ``unit``, mm or rad, as is ``sigma``. ``nest2`` is the other end of a distance.
+    """
+
+    number: int
+    pose_label: str
+    nest: str
+    nest2: str
+    q: tuple[float, ...]
+    value: float
+    expected: float
+    sigma: float
+    unit: str
     time_s: float
     channels: Mapping[str, float] = field(default_factory=dict)
 

@@ -7,11 +7,14 @@ import numpy as np
 
 from app.files.runs import write_run
 from app.files.site import Site
+from app.files.site_gauge import GaugeSite
 from app.files.text import read_text
+from app.session.gauge_export import sensed_rows
 from app.session.journal import FRAME, IDENTITIES, PARAMETERS, Journal, Row
 from app.session.plan import Plan
 from calib.arrays import Array
 from calib.runs import Digits, Header, Run, covariance_matrices
+from calib.runs.sensing import Setup
 
 DIGITS = Digits(
     time=".3f", q=".9f", position=".7f", sigma=".8f", covariance=".6e", channel=".6g",
@@ -45,9 +48,11 @@ def _header(site: Site, plan: Plan, journal: Journal) -> Header:
     known = site.machine.parameter_index
     held: Mapping[str, float] = journal.meta(PARAMETERS, {})
     serials = {role: who["serial"] for role, who in journal.meta(IDENTITIES, {}).items()}
-    tracker = {"model": site.tracker.model, "reflector": site.tracker.reflector}
-    if serials.get("tracker"):
-        tracker["serial"] = serials["tracker"]
+    tracker = {}
+    if site.gauge is None:
+        tracker = {"model": site.tracker.model, "reflector": site.tracker.reflector}
+        if serials.get("tracker"):
+            tracker["serial"] = serials["tracker"]
     if site.controller.hosted:  # q is what the machine was sent: nothing was done beyond it
         held = {}
     return Header(
@@ -61,13 +66,22 @@ def _header(site: Site, plan: Plan, journal: Journal) -> Header:
         compensation={name: v for name, v in held.items() if name not in known and v != 0.0},
         controller_frame=journal.meta(FRAME, {}),
         load=site.load,
+        setup=None if site.gauge is None else _setup(site, site.gauge),
     )
+
+
+def _setup(site: Site, gauge: GaugeSite) -> Setup:
+    """The gauge as the run's instrument, with what the site says of planes and nests."""
+    known = site.setup or Setup()
+    return Setup({gauge.name: gauge.instrument}, known.planes, known.nests)
 
 
 def run_of(rows: Sequence[Row], header: Header, actuators: int) -> Run:
     """Rows of a journal as a run."""
     kept = [row for i, row in enumerate(rows) if row.kind == "reading" or not _read_after(rows, i)]
     six = np.array([row.covariance or _NOTHING for row in kept]).reshape(-1, 6).T
+    held = kept if header.setup is not None else []
+    sensing, position, covariance = sensed_rows(held, header.setup) if held else (None, None, None)
     return Run(
         header=header,
         source="journal",
@@ -76,11 +90,14 @@ def run_of(rows: Sequence[Row], header: Header, actuators: int) -> Run:
         pose=tuple(row.pose for row in kept),
         nest=tuple(row.nest for row in kept),
         q=np.array([row.q for row in kept]).reshape(-1, actuators).T,
-        measured=np.array([row.xyz is not None for row in kept], dtype=bool),
-        position=np.array([row.xyz or _NOTHING[:3] for row in kept]).reshape(-1, 3).T,
-        covariance=covariance_matrices(six),
+        measured=np.array([row.kind == "reading" for row in kept], dtype=bool),
+        position=np.array([row.xyz or _NOTHING[:3] for row in kept]).reshape(-1, 3).T
+        if position is None
+        else position,
+        covariance=covariance_matrices(six) if covariance is None else covariance,
         channels=_channels(kept),
         left_aside={},
+        sensing=sensing,
     )
 
 

@@ -1,4 +1,4 @@
-"""Who carries SMRs from nest to nest: a person who is asked, or a mock's control socket."""
+"""Who carries SMRs and sets a gauge: a person who is asked, or a mock's control socket."""
 
 import asyncio
 import json
@@ -21,12 +21,30 @@ class Carrier(Protocol):
         ``why`` says what was wrong where it is not the first time.
         """
 
+    async def span(self, nest: str, nest2: str, ask: Ask) -> None:
+        """Set the gauge between a nest of the platform and one of the base."""
+
+    async def take_off(self, ask: Ask) -> None:
+        """Take the gauge off: the machine moves."""
+
 
 class PersonCarries:
     """The operator is asked and says when it is done."""
 
     def __init__(self, smrs: int) -> None:
         self._smrs = smrs
+
+    async def span(self, nest: str, nest2: str, ask: Ask) -> None:
+        """Have it set; raises :class:`StoppedByOperator`."""
+        text = f"Set the gauge between nest {nest} (platform) and nest {nest2} (base)."
+        if await ask(text, ("done", "stop")) == "stop":
+            raise StoppedByOperator(f"stopped when the gauge was to be set between {nest}, {nest2}")
+
+    async def take_off(self, ask: Ask) -> None:
+        """Have it taken off; raises :class:`StoppedByOperator`."""
+        text = "Take the gauge off, if it is set, and step back: the machine moves."
+        if await ask(text, ("done", "stop")) == "stop":
+            raise StoppedByOperator("stopped when the gauge was to be taken off")
 
     async def carry(self, smr: int, nest: str, ask: Ask, why: str = "") -> None:
         """Ask; raises :class:`StoppedByOperator` if the answer is to stop."""
@@ -46,6 +64,14 @@ class MockCarries:
     async def carry(self, smr: int, nest: str, ask: Ask, why: str = "") -> None:
         """Tell the mock."""
         await self._control.call("carry", smr=smr, nest=nest)
+
+    async def span(self, nest: str, nest2: str, ask: Ask) -> None:
+        """Tell the mock."""
+        await self._control.call("span", nest=nest, nest2=nest2)
+
+    async def take_off(self, ask: Ask) -> None:
+        """Tell the mock."""
+        await self._control.call("take-off")
 
 
 class MockControl:

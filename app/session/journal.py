@@ -282,6 +282,15 @@ class Journal:
                 found.setdefault(row["nest"], []).append((x, y, z))
         return found
 
+    def sent_to(self, pose: str) -> tuple[float, ...]:
+        """Where the machine was last sent for a pose; raises LookupError if it never was."""
+        row = self._db.execute(
+            "SELECT q FROM rows WHERE pose = ? ORDER BY seq DESC LIMIT 1", (pose,)
+        ).fetchone()
+        if row is None:
+            raise LookupError(pose)
+        return tuple(json.loads(row["q"]))
+
     def last_row(self) -> Row | None:
         """The last move or reading, whatever became of it."""
         row = self._db.execute("SELECT * FROM rows ORDER BY seq DESC LIMIT 1").fetchone()

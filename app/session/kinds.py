@@ -57,13 +57,19 @@ REFERENCE = StepKind("reference", "reference nest {nest} on the base", rests_on_
 DRIFT = StepKind("drift", "drift of the base", rests_on_readings=True)
 TWO_FACE = StepKind("two-face", "two-face check of the tracker")
 TRUTH = StepKind("truth", "the mock's true pose at {pose}", moves_to="pose", often=True)
+GAUGE = StepKind("gauge", "does the gauge answer?", every_time=True, skippable=False)
+APART = StepKind("apart", "take it off: the machine moves", skippable=False)
+TOUCH = StepKind("touch", "read it at {pose}", moves_to="pose", often=True)
+FOLLOWS = StepKind("follows", "does the gauge follow at {of}?", moves_to="pose")
+MARK = StepKind("mark", "leave a mark at {pose}", moves_to="pose")
+BETWEEN = StepKind("between", "measure between marks {pose} and {pose2}", often=True)
 REST = StepKind("rest", "take the power off the drives", skippable=False)
 
 KINDS: dict[str, StepKind] = {
     kind.name: kind
     for kind in (
         CONNECT, CHECK_PATH, TRACKER, DRIVES, WARM_UP, HOME, MOVE, CARRY, CONFIRM, DIRECTIONS, READ,
-        REFERENCE, DRIFT, TWO_FACE, TRUTH, REST,
+        REFERENCE, DRIFT, TWO_FACE, TRUTH, GAUGE, APART, TOUCH, FOLLOWS, MARK, BETWEEN, REST,
     )
 }  # fmt: skip
 """Every kind by its word."""

@@ -10,7 +10,7 @@ from app.hosted.controller import HostedController
 from app.hosted.means import ByMotors, ByPoses
 from app.hosted.store import HostStore, usual_folder
 from calib.effects.struts import struts_of
-from drivers.interface import MotionController, Motors, PoseMover, Tracker
+from drivers.interface import Gauge, MotionController, Motors, PoseMover, Tracker
 from drivers.kind import ActuatorFacts, Strut, Surroundings
 
 
@@ -61,9 +61,15 @@ async def open_tracker(site: Site) -> Tracker:
     return cast(Tracker, await kind.open(_around(site, "tracker")))
 
 
+async def open_gauge(site: Site) -> Gauge:
+    """Connect to the site's gauge; raises a DeviceError if it does not answer."""
+    kind = kind_named("gauge", site.measured_by.kind)
+    return cast(Gauge, await kind.open(_around(site, "gauge")))
+
+
 def _around(site: Site, role: str) -> Surroundings:
     machine = site.machine
-    own = site.controller if role == "controller" else site.tracker
+    own = site.controller if role == "controller" else site.measured_by
     return Surroundings(
         settings=own.settings,
         serial=own.serial,

@@ -1,4 +1,4 @@
-"""The two plans that operators run: measure poses, in either order, and verify."""
+"""The plans that operators run: measure poses, in either order, and verify."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,6 +8,7 @@ from app.devices import kind_named
 from app.files.pose_table import Pose
 from app.files.site import Site
 from app.session import kinds
+from app.session.gauge_plans import Manner, plan_of
 from app.session.plan import Plan, PlanWriter
 from calib.errors import BadInput
 
@@ -33,6 +34,8 @@ class PlanOptions:
     truth: bool = False
     """Ask a mock's control socket for the true pose at each pose: for judges only."""
     title: str = ""
+    marks: tuple[tuple[str, str], ...] = ()
+    """With a gauge: pairs of poses, where marks are left, between which it measures."""
 
 
 def measure_plan(
@@ -47,6 +50,17 @@ def measure_plan(
     """
     if not poses:
         raise BadInput("no poses to measure", remedy="Give a poses file with at least one pose")
+    if site.gauge is not None:
+        manner = Manner(
+            by_pose=options.order == "pose-by-pose", again_every=options.reference_every,
+            cycles=options.cycles, warm_up=options.warm_up, marks=options.marks,
+        )  # fmt: skip
+        return plan_of(site, poses, manner, purpose, options.title)
+    if options.marks:
+        raise BadInput(
+            "marks are measured by a gauge, the site has a tracker",
+            place=site.source, remedy="Leave --pair out",
+        )  # fmt: skip
     nests = _nests(site, options)
     if options.truth and site.hands.kind != "mock":
         raise BadInput("only a mock machine knows the truth", remedy="Leave --truth out")
@@ -156,6 +170,8 @@ def _nests(site: Site, options: PlanOptions) -> list[str]:
 
 def order_for(site: Site) -> Order:
     """Pose by pose where there are SMRs enough, else nest by nest."""
+    if site.gauge is not None:
+        return "nest-by-nest"
     enough = site.hands.smrs >= len(site.platform_nests)
     return "pose-by-pose" if enough else "nest-by-nest"
 

@@ -45,7 +45,7 @@ from app.session.routines import ROUTINES
 from app.session.station import Station
 from app.session.unwritten import UNWRITTEN, export_at_end, unwritten
 from app.session.within import JOURNAL
-from app.session.work import Done, StartOver, Work
+from app.session.work import Done, LeftOut, StartOver, Work
 from calib.errors import BadInput
 from drivers.errors import DeviceError
 from drivers.interface import Alarm
@@ -315,6 +315,9 @@ class Session:
         except DeviceError as error:
             self._failed(index, step, attempt, str(error))
             raise
+        except LeftOut as left:
+            self._skipped(index, step, attempt, str(left))
+            return
         except StartOver as moved:
             self._failed(index, step, attempt, str(moved))
             return

@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 from app.clock import Clock
 from app.files.site import Site
@@ -16,9 +16,9 @@ from app.session.events import (
     Observers,
 )
 from app.session.hands import Carrier, carrier_of
-from app.session.links import open_controller, open_tracker
+from app.session.links import open_controller, open_gauge, open_tracker
 from drivers.errors import ConnectFailed, DeviceError
-from drivers.interface import Alarm, Identity, MotionController, Tracker
+from drivers.interface import Alarm, Gauge, Identity, MotionController, Tracker
 
 STOP_DEADLINE_S = 3.0
 _State = TypeVar("_State")
@@ -26,10 +26,18 @@ _State = TypeVar("_State")
 
 @dataclass(frozen=True)
 class Devices:
-    """Both links, open."""
+    """Both links, open: the controller, and what measures."""
 
     controller: MotionController
-    tracker: Tracker
+    tracker: Tracker | None = None
+    gauge: Gauge | None = None
+
+    @property
+    def measuring(self) -> Tracker | Gauge:
+        """What measures; raises :class:`ConnectFailed` where nothing does."""
+        if (there := self.tracker or self.gauge) is None:
+            raise ConnectFailed("nothing that measures is connected", remedy="Connect first")
+        return there
 
 
 class Station:
@@ -61,7 +69,26 @@ class Station:
     @property
     def tracker(self) -> Tracker:
         """The tracker; raises :class:`ConnectFailed` while not connected."""
-        return self._need().tracker
+        if (there := self._need().tracker) is None:
+            raise ConnectFailed("no tracker is connected", remedy="This site has a gauge")
+        return there
+
+    @property
+    def gauge(self) -> Gauge:
+        """The gauge; raises :class:`ConnectFailed` while not connected."""
+        if (there := self._need().gauge) is None:
+            raise ConnectFailed("no gauge is connected", remedy="This site has a tracker")
+        return there
+
+    @property
+    def measuring(self) -> Tracker | Gauge:
+        """What measures; raises :class:`ConnectFailed` while not connected."""
+        return self._need().measuring
+
+    @property
+    def measures(self) -> Literal["tracker", "gauge"]:
+        """What measures at this site."""
+        return "tracker" if self.site.gauge is None else "gauge"
 
     def _need(self) -> Devices:
         if self._devices is None:
@@ -87,29 +114,35 @@ class Station:
             controller = await open_controller(self.site)
             self._check_identity("controller", controller.identity, self.site.controller.serial)
             self._own_by_serial(controller.identity.serial)
-            tracker = await open_tracker(self.site)
-            try:
-                self._check_identity("tracker", tracker.identity, self.site.tracker.serial)
-            except DeviceError:
-                await tracker.close()
-                raise
+            self._devices = await self._with_measuring(controller)
         except BaseException:
             if controller is not None:
                 await controller.close()
             self._disown()
             raise
-        self._devices = Devices(controller, tracker)
-        controller.on_alarm(self._alarm)
-        tracker.on_alarm(self._alarm)
-        addresses = {
-            "controller": self.site.controller.address,
-            "tracker": self.site.tracker.address,
-        }
-        for role, identity in (
-            ("controller", controller.identity),
-            ("tracker", tracker.identity),
+        measuring = self._devices.measuring
+        for role, device, site in (
+            ("controller", controller, self.site.controller),
+            (self.measures, measuring, self.site.measured_by),
         ):
-            self.observers.tell(Connected(role, identity, addresses[role]))
+            device.on_alarm(self._alarm)
+            self.observers.tell(Connected(role, device.identity, site.address))
+
+    async def _with_measuring(self, controller: MotionController) -> Devices:
+        """Connect to what measures as well, if it is the one that the site names."""
+        by_gauge = self.site.gauge is not None
+        devices = (
+            Devices(controller, gauge=await open_gauge(self.site))
+            if by_gauge
+            else Devices(controller, tracker=await open_tracker(self.site))
+        )
+        try:
+            serial = self.site.measured_by.serial
+            self._check_identity(self.measures, devices.measuring.identity, serial)
+        except DeviceError:
+            await devices.measuring.close()
+            raise
+        return devices
 
     def _check_identity(self, role: str, identity: Identity, serial: str) -> None:
         if serial and identity.serial != serial:
@@ -134,7 +167,7 @@ class Station:
         """Raise the fault that stands at either device, if any."""
         devices = self._need()
         devices.controller.check()
-        devices.tracker.check()
+        devices.measuring.check()
 
     async def poll(self) -> DeviceStates:
         """Ask both devices for their states, tell the observers, and return the answer.
@@ -144,8 +177,12 @@ class Station:
         """
         devices = self._need()
         controller = await self._state_of("controller", devices.controller.state)
-        tracker = await self._state_of("tracker", devices.tracker.state)
-        states = DeviceStates(controller, tracker)
+        tracker = gauge = None
+        if devices.tracker is not None:
+            tracker = await self._state_of("tracker", devices.tracker.state)
+        elif devices.gauge is not None:
+            gauge = await self._state_of("gauge", devices.gauge.state)
+        states = DeviceStates(controller, tracker, gauge)
         self.observers.tell(states)
         return states
 
@@ -160,7 +197,7 @@ class Station:
         """Stop all motion and any measurement; never raises. Returns whether both confirmed."""
         if self._devices is None:
             return True
-        stops = (self._devices.controller.stop, self._devices.tracker.stop)
+        stops = (self._devices.controller.stop, self._devices.measuring.stop)
         confirmed = await asyncio.gather(*(self._stopped(stop) for stop in stops))
         return all(confirmed)
 
@@ -186,7 +223,7 @@ class Station:
         if devices is not None:
             for role, close in (
                 ("controller", devices.controller.close),
-                ("tracker", devices.tracker.close),
+                (self.measures, devices.measuring.close),
             ):
                 await close()
                 self.observers.tell(Disconnected(role))

@@ -7,7 +7,8 @@ from typing import Any
 
 from app.errors import GateRefused
 from app.files.pose_table import Pose
-from app.files.site import Limits, Site
+from app.files.site import Site
+from app.files.site_limits import Limits
 from app.session.events import (
     AlarmRaised,
     Event,
@@ -26,7 +27,7 @@ from app.session.station import Station
 from calib.arrays import Array
 from calib.frames import Frame, nest_in_base
 from drivers.errors import DeviceError
-from drivers.interface import Alarm, MotionController, Tracker
+from drivers.interface import Alarm, Gauge, MotionController, Tracker
 
 Point = tuple[float, float, float]
 
@@ -53,6 +54,8 @@ class Memory:
     settled: bool = False
     channels: tuple[float, dict[str, float]] = field(default_factory=lambda: (0.0, {}))
     """When the channels were last asked for (machine s), and the answer."""
+    spanned: tuple[str, str] | None = None
+    """Nests between which the gauge is set; empty: it is off; None: not known."""
     seen: Seen = field(default_factory=Seen)
     """By which the next reading is judged."""
 
@@ -68,6 +71,10 @@ class Done:
     result: Mapping[str, Any] = field(default_factory=dict)
     reading: NewRow | None = None
     news: tuple[Event, ...] = ()
+
+
+class LeftOut(Exception):
+    """The operator leaves a step out; why is its text."""
 
 
 class StartOver(Exception):
@@ -92,7 +99,8 @@ class Work:
         self.unattended = unattended
         self.expected = expected
         self.clock = station.clock
-        self.memory = Memory(Frame.of(station.site.tracker.frame))
+        by_gauge = station.site.gauge is not None
+        self.memory = Memory(Frame.of((0.0,) * 6 if by_gauge else station.site.tracker.frame))
         self.step = ""
         self.attempt = 0
         self.guarded = False
@@ -123,6 +131,11 @@ class Work:
     def tracker(self) -> Tracker:
         """The tracker."""
         return self.station.tracker
+
+    @property
+    def gauge(self) -> Gauge:
+        """The gauge."""
+        return self.station.gauge
 
     def pose(self, label: str) -> Pose:
         """Look up a pose by its label; ``home`` is the machine's own."""

@@ -140,11 +140,11 @@ class Desk:
         if not self.connected or self.busy or self.station is None:
             return
         states = await self.station.poll()
-        if states.controller is None and states.tracker is None and not self.busy:
+        if not any((states.controller, states.tracker, states.gauge)) and not self.busy:
             await self.station.close()
             fault = self.picture.trouble if self.picture.run == "fault" else None
             self.picture.say_trouble(
-                "Neither controller nor tracker answers",
+                "Neither controller nor what measures answers",
                 "Look at power and network, then connect again (c on the Devices screen)",
             )
             self.picture.trouble = fault or self.picture.trouble

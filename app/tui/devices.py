@@ -20,10 +20,14 @@ from app.tui.next_step import job_steps
 from app.tui.picture import Picture
 from app.tui.starting import MYSTERY, start_text
 from app.tui.wording import channel_text
-from drivers.interface import ActuatorState, ControllerState, TrackerState
+from drivers.interface import ActuatorState, ControllerState, GaugeState, TrackerState
 
 RECENT = 3
 """Sessions on the empty screen."""
+
+
+MEASURES = {"tracker": "Laser tracker", "gauge": "Gauge"}
+"""Head of the panel of what measures."""
 
 
 class DevicesFace(Face):
@@ -91,11 +95,22 @@ class DevicesFace(Face):
             "controller",
             controller_text(links.get("controller"), states.controller if states else None),
         )
-        self._put("tracker", tracker_text(links.get("tracker"), states.tracker if states else None))
+        role = self._measures()
+        self.query_one("#dev-tracker").border_title = MEASURES[role]
+        if role == "gauge":
+            gauge = gauge_text(links.get(role), states.gauge if states else None)
+            self._put("tracker", gauge)
+        else:
+            state = states.tracker if states else None
+            self._put("tracker", tracker_text(links.get(role), state))
         self._put("alarms", alarms_text(picture, 1 if self.low else 30))
-        for role in ("controller", "tracker"):
-            link = links.get(role)
-            self.query_one(f"#dev-{role}").border_subtitle = link.address if link else ""
+        for panel, name in (("controller", "controller"), ("tracker", role)):
+            link = links.get(name)
+            self.query_one(f"#dev-{panel}").border_subtitle = link.address if link else ""
+
+    def _measures(self) -> str:
+        site = self.desk.site
+        return "gauge" if site is not None and site.gauge is not None else "tracker"
 
     def _site_text(self) -> Content:
         if self.desk.site is not None:
@@ -195,6 +210,16 @@ def site_text(site: Site, mock: bool) -> Content:
     who = "the mock" if site.hands.kind == "mock" else "you"
     smrs = "one SMR" if site.hands.smrs == 1 else f"{site.hands.smrs} SMRs"
     own = "  (started by this program)" if mock else ""
+    if site.gauge is not None:
+        gauge = site.gauge
+        pairs = (
+            f"{len(gauge.pairs)} pairs of nests" if gauge.pairs else f"at {gauge.nest or 'marks'}"
+        )
+        return Content(
+            f"{site.title or site.source}{own}   clock x{site.clock_scale:g}\n"
+            f"{site.machine.name}; {gauge.name} reads a {gauge.reads}, {pairs}"
+            + (f", plane {gauge.plane}" if gauge.plane else "")
+        )
     lines = [
         f"{site.title or site.source}{own}   clock x{site.clock_scale:g}",
         f"{site.machine.name}; nests {', '.join(site.platform_nests)}; base "
@@ -268,6 +293,17 @@ def tracker_text(link: Connected | None, state: TrackerState | None) -> Content:
         ]
         signs.append(Content(f"{state.reflector or 'no reflector'}  face {state.face}"))
         lines.append(Content("  ").join(signs))
+    return Content("\n").join(lines)
+
+
+def gauge_text(link: Connected | None, state: GaugeState | None) -> Content:
+    """Identity, and what it said last."""
+    lines = [identity_line(link)]
+    if link is not None and state is None:
+        lines.append(Content("no answer to the last question; see the alarms"))
+    if state is not None:
+        sign = "[$success]✓[/] $said" if state.ready else "[$warning]✗ no number[/]: $said"
+        lines.append(Content.from_markup(sign, said=state.last or "not read yet"))
     return Content("\n").join(lines)
 
 

@@ -45,7 +45,9 @@ class MachineView(Static):
         if site is None:
             self.update("")
             return
-        heads, drawing = sketch(site, pose, nest, frame or site.tracker.frame, *size)
+        there = site.tracker_there
+        frame = frame or (there.frame if there is not None else None)
+        heads, drawing = sketch(site, pose, nest, frame, *size)
         self.update(Content(f"{heads}\n{drawing}"))
         at = picture.pose.pose_label if picture.pose is not None else "home"
         self.border_subtitle = f"{at}; nests, beam to {nest}" if nest else at
@@ -55,11 +57,11 @@ def sketch(
     site: "Site",
     pose: tuple[float, ...] | None,
     nest: str,
-    frame: tuple[float, ...],
+    frame: tuple[float, ...] | None,
     columns: int,
     rows: int,
 ) -> tuple[str, str]:
-    """Headings and drawing; ``frame`` is the base frame in the tracker frame."""
+    """Headings and drawing; ``frame`` is the base frame in that of a tracker, if any."""
     from app.show.machine_sketch import Around, corners_of, two_views
     from calib.analysis.skeleton import skeleton
     from calib.mechanism.rigid import Poses
@@ -76,7 +78,7 @@ def sketch(
     room = ROOM * float(np.max(largest - least))
     beam = None
     names = [*site.platform_nests, *site.base_nests]
-    if nest in names:
+    if nest in names and frame is not None:
         tracker = Poses.from_xyz_rpy(np.array(frame)[:, None])
         stands = -tracker.rotation[:, :, 0].T @ tracker.position[:, 0]
         beam = np.stack([nests[:, names.index(nest)], stands], axis=1)

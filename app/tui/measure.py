@@ -1,4 +1,4 @@
-"""Measure: the step list, what the machine and the tracker do now, the residuals growing."""
+"""Measure: the step list, what machine and tracker (or gauge) do now, the residuals growing."""
 
 import math
 from collections.abc import Sequence
@@ -12,6 +12,7 @@ from textual.content import Content
 from textual.widgets import Static
 
 from app.files.site import Site
+from app.session.events import NumberTaken
 from app.session.listing import facts_of
 from app.tui.dialogs import Pick
 from app.tui.face import Face
@@ -196,6 +197,8 @@ def _scatter(picture: Picture) -> Content:
 
 
 def _reading(picture: Picture) -> Content:
+    if picture.last_number is not None:
+        return _number(picture, picture.last_number)
     last = picture.last_reading
     if last is None:
         return Content("-")
@@ -204,7 +207,21 @@ def _reading(picture: Picture) -> Content:
     return Content(f"nest {last.nest}: off by {miss}{aside}")
 
 
+def _number(picture: Picture, last: NumberTaken) -> Content:
+    aside = f", {picture.rejected} set aside" if picture.rejected else ""
+    unit = "µm" if last.unit == "mm" else "mrad"
+    off = plus_minus((last.value - last.expected) * 1000, last.sigma * 1000, unit, sign="±")
+    shown = f"{last.value:.4f} mm" if last.unit == "mm" else f"{math.degrees(last.value):.4f} deg"
+    to = f" to {last.nest2}" if last.nest2 else ""
+    return Content(f"{last.nest}{to}: {shown}, off by {off}{aside}")
+
+
 def _base(picture: Picture) -> Content:
+    if picture.last_number is not None:
+        if picture.drift is None:
+            return Content("zero: not looked at again yet")
+        shift, limit = picture.drift.shift_mm * 1000, picture.drift.limit_mm * 1000
+        return Content(f"zero moved {shift:.1f}/{limit:.0f} µm")
     if picture.frame is None:
         return Content("not found yet")
     text = f"found, RMS {picture.frame.rms_mm * 1000:.1f}"

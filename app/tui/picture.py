@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from app.session import events as ev
+from app.session.gauge_rows import GAUGE, before, numbers
 from app.session.session import Session
 from drivers.interface import Alarm
 
@@ -34,7 +35,7 @@ class StepLine:
 
 @dataclass(frozen=True)
 class Point:
-    """A reading as the plots need it: how far from its prediction, and how sure, mm.
+    """A reading as the plots need it: how far from its prediction, and how sure, mm (rad).
 
     Readings taken before the base was found in the tracker's frame are not among them: they would
     only show how roughly the tracker was put down.
@@ -91,6 +92,7 @@ class Picture:
     settling: ev.LiveScatter | None = None
     points: list[Point] = field(default_factory=list)
     last_reading: ev.ReadingTaken | None = None
+    last_number: ev.NumberTaken | None = None
     rejected: int = 0
     frame: ev.FrameFound | None = None
     drift: ev.DriftChecked | None = None
@@ -108,7 +110,7 @@ class Picture:
         ]
         self.purpose, self.title = session.plan.purpose, session.plan.title
         self.run, self.current, self.progress, self.trouble = "running", None, None, None
-        self.points, self.rejected, self.last_reading = [], 0, None
+        self.points, self.rejected, self.last_reading, self.last_number = [], 0, None, None
         self.frame = self.drift = self.pose = self.live = self.settling = None
         self.scatter.clear()
         self.revision += 1
@@ -122,6 +124,13 @@ class Picture:
         rows = [row for row in session.journal.rows(good_only=False) if row.kind == "reading"]
         self.rejected = sum(row.status != "good" for row in rows)
         self.frame = work.memory.base
+        if work.site.gauge is not None:
+            zero, sigma = work.site.gauge.zero_of(before(session.journal)), work.site.gauge.sigma
+            for row in numbers(session.journal):
+                off = abs(row.raw[GAUGE]["value"] - row.raw[GAUGE]["expected"] - zero)
+                name = _ends(row.nest, row.raw[GAUGE]["nest2"])
+                self.points.append(Point(len(self.points) + 1, row.pose, name, off, sigma))
+            return
         if not work.memory.frame_found:
             return
         for row in rows:
@@ -257,6 +266,18 @@ def _reading(picture: Picture, event: ev.ReadingTaken) -> None:
     picture.last_reading = event
 
 
+def _number(picture: Picture, event: ev.NumberTaken) -> None:
+    name, number = _ends(event.nest, event.nest2), len(picture.points) + 1
+    off = abs(event.value - event.expected)
+    picture.points.append(Point(number, event.pose_label, name, off, event.sigma))
+    picture.last_number = event
+
+
+def _ends(nest: str, nest2: str) -> str:
+    """What is read: a nest, or a pair."""
+    return f"{nest}-{nest2}" if nest2 else nest
+
+
 def _rejected(picture: Picture, event: ev.ReadingRejected) -> None:
     picture.rejected += 1
     picture.write(
@@ -370,6 +391,7 @@ _FOLDS: dict[type[ev.Event], Callable[[Picture, Any], None]] = {
     ev.LivePose: _live,
     ev.LiveScatter: _scatter,
     ev.ReadingTaken: _reading,
+    ev.NumberTaken: _number,
     ev.ReadingRejected: _rejected,
     ev.FrameFound: _frame,
     ev.DriftChecked: _drift,

@@ -15,18 +15,17 @@ from textual.widgets import Button, Checkbox, Input, RadioButton, RadioSet, Stat
 
 from app.defaults import FEWEST_FIRST, MOST_FIRST
 from app.files.pose_table import Pose, read_poses
-from app.files.poses import full_poses, nest_matrix, read_pose_file
+from app.files.poses import full_poses, read_pose_file
 from app.files.site import Site
+from app.jobs.measuring import marks_of
+from app.jobs.read_there import drawn_for, readings_of
 from app.session.plan import Plan
 from app.session.plans import Order, PlanOptions, measure_plan
 from app.tui.automatic import FlightWish
 from app.tui.dialogs import Dialog
 from calib.poses import design_poses
 from calib.poses.margin import stroke_margin
-from calib.poses.readings import NestReadings
 
-SIGMA_MM = 0.005
-"""Uncertainty per axis that the choice of poses expects of a reading."""
 SEED = 1
 
 
@@ -42,7 +41,8 @@ class RunWish:
 async def plan_for(site: Site, wish: RunWish) -> Plan:
     """Choose or read the poses and expand the plan; raises :class:`BadInput`."""
     poses = await _poses(site, wish.poses)
-    options = PlanOptions(order=wish.order, warm_up=wish.warm_up)
+    marks = () if wish.poses.isdigit() else marks_of((), wish.poses, site)
+    options = PlanOptions(order=wish.order, warm_up=wish.warm_up, marks=marks)
     return measure_plan(site, poses, options)
 
 
@@ -57,10 +57,10 @@ async def _poses(site: Site, wish: str) -> dict[str, Pose]:
 
 
 def _choose(site: Site, count: int) -> dict[str, Pose]:
-    nests, base = nest_matrix(site.platform_nests), nest_matrix(site.base_nests)
+    margin = stroke_margin(site.machine, site.limits.margin_mm)
     design = design_poses(
-        site.machine, NestReadings(nests, SIGMA_MM, base), count, np.random.default_rng(SEED),
-        counts=(), margin=stroke_margin(site.machine, site.limits.margin_mm),
+        site.machine, readings_of(site.machine, site, False, None, None), count,
+        np.random.default_rng(SEED), counts=(), margin=margin, draw=drawn_for(site, margin),
     )  # fmt: skip
     return full_poses(design.labels, design.pose_set)
 
@@ -92,6 +92,7 @@ class NewRun(Dialog[RunWish]):
         super().__init__("New run")
         self._enough = site.hands.smrs >= len(site.platform_nests)
         self._nests = len(site.platform_nests)
+        self._gauge = site.gauge
 
     def body(self) -> ComposeResult:
         """Poses, order, warm-up, start."""
@@ -101,13 +102,18 @@ class NewRun(Dialog[RunWish]):
         )
         yield Input("29", id="poses", compact=True)
         yield Static(Content("Order:"), classes="form-label")
+        first, second = (
+            (
+                "nest by nest: one SMR is carried, all poses with each nest",
+                f"pose by pose: an SMR in each of the {self._nests} nests",
+            )
+            if self._gauge is None
+            else ("pair by pair, or place by place", "pose by pose: all pairs of nests at each")
+        )
+        by_pose = self._enough and self._gauge is None
         with RadioSet(id="order", compact=True):
-            yield Radio(
-                "nest by nest: one SMR is carried, all poses with each nest", value=not self._enough
-            )
-            yield Radio(
-                f"pose by pose: an SMR in each of the {self._nests} nests", value=self._enough
-            )
+            yield Radio(first, value=not by_pose)
+            yield Radio(second, value=by_pose)
         yield Check("wait until temperatures are steady", True, id="warm-up", compact=True)
         with Horizontal(classes="dialog-buttons"):
             yield Button("Start", variant="success", id="start")

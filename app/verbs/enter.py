@@ -31,7 +31,13 @@ if TYPE_CHECKING:
 @click.option("--sigma-um", type=float, required=True, help="Standard uncertainty of a number.")
 @click.option("--unit", type=click.Choice(list(UNITS)), default="mm", show_default=True)
 @click.option("--comma", is_flag=True, help="Decimals stand behind a comma.")
-@click.option("--pair", "pairs", multiple=True, metavar="A:B", help="Marks for calipers; repeated.")
+@click.option(
+    "--pair",
+    "pairs",
+    multiple=True,
+    metavar="A:B",
+    help="Marks for calipers; repeated.  [default: those of the poses file]",
+)
 @click.option(
     "--tool", nargs=3, type=float, default=(0.0, 0.0, 0.0), metavar="X Y Z", show_default=True,
     help="The tip in the platform frame, mm.",
@@ -64,6 +70,7 @@ def command(
     own; calipers measure between marks that the tool has left at poses (--pair A:B).
     """
     from app.jobs.entering import enter
+    from app.jobs.measuring import mark_pair
 
     for name, value in (("--sigma-um", sigma_um), ("--near", near)):
         if not 0.0 < value < float("inf"):
@@ -80,7 +87,7 @@ def command(
         machine=machine,
         unit=unit,
         decimal="," if comma else ".",
-        pairs=[_pair(one) for one in pairs],
+        pairs=[mark_pair(one) for one in pairs],
         at=tool,
         near_mm=near,
     ).to_json()
@@ -92,13 +99,6 @@ def _ask(text: str) -> str:
     click.echo(f"{text}: ", nl=False, err=True)
     line = sys.stdin.readline()
     return line.rstrip("\n") if line else "s"
-
-
-def _pair(text: str) -> tuple[str, str]:
-    first, between, second = text.partition(":")
-    if not between or not first or not second or first == second:
-        raise BadInput(f'"{text}" names no two poses', place="--pair", remedy="Write --pair A:B")
-    return first, second
 
 
 def _words(report: dict[str, Any]) -> str:

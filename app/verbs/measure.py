@@ -1,4 +1,4 @@
-"""Measure poses with the tracker, and write a run"""
+"""Measure poses with a tracker or a gauge, and write a run"""
 
 import asyncio
 from pathlib import Path
@@ -44,6 +44,10 @@ from app import answer
     type=click.IntRange(1),
     help="How many times all poses are visited.",
 )
+@click.option(
+    "--pair", "pairs", multiple=True, metavar="A:B",
+    help="With a gauge that reads distances: marks at two poses; repeated.",
+)  # fmt: skip
 @click.option("--no-warm-up", is_flag=True, help="Do not wait until temperatures are steady.")
 @click.option("--unattended", "alone", is_flag=True, help="Nobody answers questions.")
 @click.option(
@@ -60,6 +64,7 @@ def command(
     order: str | None,
     reference_every: int,
     cycles: int,
+    pairs: tuple[str, ...],
     no_warm_up: bool,
     alone: bool,
     folder: Path,
@@ -68,13 +73,16 @@ def command(
 ) -> None:
     """Visit all poses with an SMR in each nest and write the readings as a run.
 
+    Where the site has a gauge instead of a tracker its number is read at each pose: a plate is
+    touched at these places, or a bar is read between nests (docs/gauges.md).
+
     Everything is journaled as it happens: after a stop, a fault or a power cut, pkmcal resume
     goes on where the session was. The whole path is checked against all limits before the first
     move.
     """
     from app.console import run_on_console, unattended
     from app.files.site import load_site
-    from app.jobs.measuring import begin_measuring, session_report
+    from app.jobs.measuring import begin_measuring, mark_pair, session_report
     from app.session.plans import Order
 
     session = begin_measuring(
@@ -86,6 +94,7 @@ def command(
         cycles=cycles,
         warm_up=not no_warm_up,
         title=title,
+        pairs=[mark_pair(one) for one in pairs],
         unattended=unattended(alone),
     )
     answer.say(f"session {session.folder}")

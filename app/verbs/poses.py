@@ -34,6 +34,14 @@ from calib.errors import BadInput
 )
 @click.option("--site", "site_file", type=click.Path(path_type=Path), help="Nests of a site file.")
 @click.option("--heights", is_flag=True, help="Only heights over the base are read.")
+@click.option(
+    "--calipers", type=click.IntRange(0), default=0, metavar="N",
+    help="Choose N pairs of marks, too, to be measured with calipers.",
+)  # fmt: skip
+@click.option(
+    "--calipers-um", type=float, default=20.0, show_default=True,
+    help="Standard uncertainty of such a distance, um.",
+)  # fmt: skip
 @click.option("--sigma-um", type=float, help="Standard uncertainty of a reading per axis, um.")
 @click.option("--angle-mdeg", type=float, help="The same of an angle, where poses are read whole.")
 @click.option(
@@ -62,6 +70,8 @@ def command(
     priors: bool,
     site_file: Path | None,
     heights: bool,
+    calipers: int,
+    calipers_um: float,
     sigma_um: float | None,
     angle_mdeg: float | None,
     candidates: int,
@@ -94,6 +104,8 @@ def command(
             criterion="D" if criterion == "D" else "I",
             priors=priors,
             heights=heights,
+            calipers=calipers,
+            calipers_um=calipers_um,
             sigma_um=sigma_um,
             angle_mdeg=angle_mdeg,
             candidates=candidates,
@@ -122,8 +134,21 @@ def _text(report: dict[str, Any]) -> str:
         f"predicted RMS at fresh poses: {_number(predicted['position_rms_um'])} um, "
         f"{_number(predicted['orientation_rms_mdeg'])} mdeg "
         f"({count} random poses: {_number(report['random_poses']['position_rms_um'])} um)\n"
+        f"{_marks(report)}"
         f"path: {report['path_in_strokes']:.1f} strokes of the slowest actuator, within all "
         f"limits\n{_kept_free(report)}\n\n{table}"
+    )
+
+
+def _marks(report: dict[str, Any]) -> str:
+    """Pairs of marks, and what they add."""
+    if not report["pairs"]:
+        return ""
+    with_them = report["with_pairs"]
+    return (
+        f"calipers between the marks {', '.join(report['pairs'])}: "
+        f"{_number(with_them['position_rms_um'])} um, "
+        f"{_number(with_them['orientation_rms_mdeg'])} mdeg\n"
     )
 
 

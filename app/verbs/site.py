@@ -61,7 +61,8 @@ def check(site_file: Path) -> None:
     site = load_site(site_file)
     said = (
         f"{site_file}: {site.machine.name}; controller {site.controller.kind} at "
-        f"{site.controller.address}; tracker {site.tracker.kind} at {site.tracker.address}; "
+        f"{site.controller.address}; {'gauge' if site.gauge else 'tracker'} "
+        f"{site.measured_by.kind} at {site.measured_by.address}; "
         f"{len(site.platform_nests)} nests on the platform, {len(site.base_nests)} on the base"
     )
     click.echo(printable(said))

@@ -1,6 +1,6 @@
 """Design of a measuring campaign: which poses, in which order, and what they will give."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -124,6 +124,7 @@ def design_poses(
     candidates: int = POSES_FROM,
     counts: Sequence[int] = TABLE,
     margin: Margin | None = None,
+    draw: Callable[[int, np.random.Generator], PoseSet] | None = None,
 ) -> Design:
     """Choose measurement poses.
 
@@ -146,6 +147,8 @@ def design_poses(
         Numbers of poses for the table; empty for none.
     margin : Margin, optional
         Kept free of all limits by the poses and on the way between them.
+    draw : function, optional
+        Draws so many candidates where not every reachable pose is one.
 
     Raises
     ------
@@ -158,7 +161,11 @@ def design_poses(
         raise BadInput(
             f"{count} poses of {candidates} candidates", remedy="Ask for fewer poses, at least one."
         )
-    pool = sample_poses(machine, candidates, generator, margin)
+    pool = (
+        sample_poses(machine, candidates, generator, margin)
+        if draw is None
+        else draw(candidates, generator)
+    )
     fresh_poses = sample_poses(machine, FRESH, generator)
     known = prior(pool, readings, priors=priors)
     rows = whitened_rows(pool, readings, known.scale)

@@ -165,7 +165,11 @@ class DirectionReadings:
         nests, axes = self.nests.shape[1], self.axes.shape[1]
         heights = axes == 1 and np.allclose(self.axes[:, 0], (0.0, 0.0, 1.0))
         what = "heights" if heights else f"components along {axes} directions"
-        of = "the platform's origin" if not np.any(self.nests) else f"{nests} platform nests"
+        of = (
+            "the platform's origin"
+            if not np.any(self.nests)
+            else f"{nests} platform nest{'s' if nests > 1 else ''}"
+        )
         return f"{what} of {of}, +-{self.sigma * 1e3:.3g} um (1 sigma)"
 
     @property
@@ -181,8 +185,7 @@ class DirectionReadings:
             for axis in self.axes.T:
                 along = np.repeat(axis[:, None], poses.count, axis=1)
                 rows.append(np.concatenate([along, cross(arm, along)]))
-        stacked = np.array(rows) / self.sigma
-        return _root(np.einsum("rin,rjn->nij", stacked, stacked))
+        return pose_root(np.array(rows) / self.sigma)
 
     def frame_information(self) -> Array:
         """Nothing is asked about the frame."""
@@ -199,6 +202,11 @@ def _point_information(arm: Array) -> Array:
         rows[:, 3 + i] = cross(np.broadcast_to(axis, arm.shape), arm)
     out: Array = np.einsum("rin,rjn->ijn", rows, rows)
     return out
+
+
+def pose_root(rows: Array) -> Array:
+    """K (6, 6, N) with K^T K the sum over M whitened rows (M, 6, N) of r^T r."""
+    return _root(np.einsum("rin,rjn->nij", rows, rows))
 
 
 def _root(information: Array) -> Array:

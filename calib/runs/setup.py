@@ -61,12 +61,17 @@ def _spread(table: TomlTable) -> Array:
 def setup_of(top: TomlTable, spreads: Mapping[str, Array]) -> Setup:
     """Read ``[instruments.NAME]`` and ``[planes.NAME]``; raises BadInput."""
     instruments = top.named("instruments", required=False)
-    planes = top.named("planes", required=False)
     return Setup(
         instruments={name: _instrument(instruments.table(name)) for name in instruments},
-        planes={name: _plane(planes.table(name)) for name in planes},
+        planes=planes_of(top),
         nests=dict(spreads),
     )
+
+
+def planes_of(top: TomlTable) -> dict[str, Plane]:
+    """Read ``[planes.NAME]``; raises BadInput."""
+    planes = top.named("planes", required=False)
+    return {name: _plane(planes.table(name)) for name in planes}
 
 
 def _instrument(table: TomlTable) -> Instrument:

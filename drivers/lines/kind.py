@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drivers.errors import DeviceError
 from drivers.interface import Tracker
@@ -10,26 +10,33 @@ from drivers.kind import Kind, Setting, Surroundings
 from drivers.lines.patience import slow_on
 from drivers.lines.reading import PLAIN, UNITS, fault_in
 
+if TYPE_CHECKING:
+    from drivers.lines.source import Source
+
 _LINKS = ("tcp", "serial", "file")
 _FRAMES = tuple(f"{bits}{parity}{stop}" for bits in "78" for parity in "NEO" for stop in "12")
 
 
+async def open_source(settings: Mapping[str, Any], device: str) -> "Source":
+    """Where the lines of a tracker or a gauge come from; raises ConnectFailed."""
+    from drivers.lines.source import FileSource, SerialSource, TcpSource
+
+    if settings["link"] == "tcp":
+        return await TcpSource.open(settings["source"], device)
+    if settings["link"] == "serial":
+        return await SerialSource.open(
+            settings["source"], settings["baud"], settings["serial_frame"], device
+        )
+    return await FileSource.open(settings["source"], device)
+
+
 async def _open(around: Surroundings) -> Tracker:
     from drivers.lines.reading import LinePattern
-    from drivers.lines.source import FileSource, SerialSource, Source, TcpSource
     from drivers.lines.tracker import LineSettings, LineTracker
 
     settings = around.settings
     device = f"instrument {settings['source']}"
-    source: Source
-    if settings["link"] == "tcp":
-        source = await TcpSource.open(settings["source"], device)
-    elif settings["link"] == "serial":
-        source = await SerialSource.open(
-            settings["source"], settings["baud"], settings["serial_frame"], device
-        )
-    else:
-        source = await FileSource.open(settings["source"], device)
+    source = await open_source(settings, device)
     tracker = LineTracker(
         source,
         LinePattern(
@@ -52,7 +59,8 @@ async def _open(around: Surroundings) -> Tracker:
     return tracker
 
 
-def _address(settings: Mapping[str, Any]) -> str:
+def address_of(settings: Mapping[str, Any]) -> str:
+    """What names an instrument of lines."""
     return f"{settings['link']}:{settings['source']}"
 
 
@@ -63,11 +71,27 @@ def _no_pattern(text: str) -> str:
         return f"no pattern: {error}"
 
 
+LINK = (
+    Setting("source", "text", "host:port, a serial port, or the path of a file that grows"),
+    Setting("link", "text", "what source is", "tcp", choices=_LINKS),
+    Setting("baud", "whole", "of a serial port", 9600, least=50, most=4_000_000),
+    Setting(
+        "serial_frame",
+        "text",
+        "of a serial port: bits, parity, stop bits",
+        "8N1",
+        choices=_FRAMES,
+    ),
+)
+"""Where lines come from, of trackers and of gauges."""
+IGNORE = Setting(
+    "ignore", "text", "pattern of lines that say nothing: headers, echoes", "", check=_no_pattern
+)
+
 KIND: Kind[Tracker] = Kind(
     says="Any instrument or program that sends one reading of a point a line: TCP, serial, a file",
     settings=(
-        Setting("source", "text", "host:port, a serial port, or the path of a file that grows"),
-        Setting("link", "text", "what source is", "tcp", choices=_LINKS),
+        *LINK,
         Setting("sigma_mm", "number", "standard uncertainty of a reading, mm per axis", least=1e-6),
         Setting(
             "each",
@@ -85,24 +109,10 @@ KIND: Kind[Tracker] = Kind(
             "",
             check=lambda text: fault_in(text) if text else "",
         ),
-        Setting(
-            "ignore",
-            "text",
-            "pattern of lines that say nothing: headers, echoes",
-            "",
-            check=_no_pattern,
-        ),
+        IGNORE,
         Setting("ask", "text", r"what is sent for a reading, as READ?\n; empty: nothing", ""),
         Setting("silence_s", "number", "seconds without a line that are a fault", 5.0, least=0.1),
-        Setting("baud", "whole", "of a serial port", 9600, least=50, most=4_000_000),
-        Setting(
-            "serial_frame",
-            "text",
-            "of a serial port: bits, parity, stop bits",
-            "8N1",
-            choices=_FRAMES,
-        ),
     ),
     open=_open,
-    address=_address,
+    address=address_of,
 )

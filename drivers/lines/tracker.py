@@ -3,11 +3,10 @@
 import asyncio
 import math
 import statistics
-from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 
-from drivers.errors import BeamBroken, DeviceError, LinkLost, NotReady, Refused, Silence
+from drivers.errors import BeamBroken, DeviceError, NotReady, Refused
 from drivers.interface import (
     Alarm,
     Identity,
@@ -16,8 +15,9 @@ from drivers.interface import (
     TrackerState,
     TrackSample,
 )
+from drivers.lines.listener import Listener
 from drivers.lines.reading import LinePattern, Reading
-from drivers.lines.source import REMEDY, Source
+from drivers.lines.source import Source
 
 LEAST_SAMPLES = 3
 """Lines of a stream that make a dwell at least."""
@@ -58,30 +58,32 @@ class LineTracker:
     ) -> None:  # fmt: skip
         self.identity = Identity("lines")
         self.can = TrackerCan(streams=settings.stream)
-        self._source, self._pattern, self._settings = source, pattern, settings
+        self._pattern, self._settings = pattern, settings
         self._device, self._scale = device, time_scale
-        self._alarms: list[Callable[[Alarm], None]] = []
-        self._lost: DeviceError | None = None
         self._locked = not settings.stream
-        self._listeners: set[asyncio.Queue[Reading | DeviceError]] = set()
-        self._task = asyncio.ensure_future(self._listen())
+        self._lines: Listener[Reading] = Listener(
+            source, self._read, settings.silence_s, settings.stream, device
+        )
 
     async def first_line(self) -> None:
         """Wait for a stream to begin; raises Silence, LinkLost."""
         if self._settings.stream:
-            with self._queue() as heard:
+            with self._lines.queue() as heard:
                 said = await heard.get()
             if isinstance(said, DeviceError) and not isinstance(said, BeamBroken):
                 raise said
 
     def on_alarm(self, callback: Callable[[Alarm], None]) -> None:
         """Call ``callback`` for everything said unasked."""
-        self._alarms.append(callback)
+        self._lines.on_alarm(callback)
 
     def check(self) -> None:
         """Raise the fault that is standing."""
-        if self._lost is not None:
-            raise self._lost
+        try:
+            self._lines.check()
+        except DeviceError:
+            self._locked = False
+            raise
 
     async def state(self) -> TrackerState:
         """What is known of it: whether lines come, and hold readings."""
@@ -103,14 +105,13 @@ class LineTracker:
             For a line of a dwell that is far from the others.
         Silence, LinkLost
         """
-        with self._queue() as heard:
-            if self._settings.ask:
-                await self._source.send(self._settings.ask)
+        with self._lines.queue() as heard:
+            await self._lines.ask(self._settings.ask)
             if self._settings.stream:
                 samples = await self._dwell(heard, dwell_s / self._scale)
                 self._must_agree(samples)
                 return self._mean(samples)
-            said = await self._next(heard)
+            said = await self._lines.next(heard)
         return self._mean([said])
 
     async def _dwell(
@@ -120,7 +121,7 @@ class LineTracker:
         end = loop.time() + wall_s
         samples: list[Reading] = []
         while loop.time() < end or len(samples) < LEAST_SAMPLES:
-            samples.append(await self._next(heard))
+            samples.append(await self._lines.next(heard))
         return samples
 
     def _must_agree(self, samples: list[Reading]) -> None:
@@ -150,9 +151,9 @@ class LineTracker:
         """Samples as they come, none closer than ``separation_s``."""
         loop = asyncio.get_running_loop()
         latest = -math.inf
-        with self._queue() as heard:
+        with self._lines.queue() as heard:
             while True:
-                reading = await self._next(heard)
+                reading = await self._lines.next(heard)
                 now = loop.time() * self._scale
                 if now - latest >= separation_s:
                     latest = now
@@ -165,14 +166,11 @@ class LineTracker:
 
     async def stop(self) -> None:
         """End a dwell."""
-        self._tell(BeamBroken("stopped by the operator", device=self._device))
+        self._lines.tell(BeamBroken("stopped by the operator", device=self._device))
 
     async def close(self) -> None:
         """Release the link; never raises."""
-        self._fail(LinkLost("the connection was closed", device=self._device), say=False)
-        self._task.cancel()
-        await asyncio.wait([self._task], timeout=1.0)
-        await self._source.close()
+        await self._lines.close()
 
     async def select_reflector(self, name: str) -> None:
         """It knows no reflectors."""
@@ -193,30 +191,13 @@ class LineTracker:
     def _cannot(self, what: str) -> Refused:
         return Refused(f"an instrument that only sends lines cannot {what}", device=self._device)
 
-    # ------------------------------------------------------------ lines
-
-    async def _listen(self) -> None:
-        lines = self._source.lines()
-        longest = self._settings.silence_s if self._settings.stream else None
-        try:
-            while True:
-                async with asyncio.timeout(longest):
-                    line = await anext(lines)
-                if self._pattern.ignores(line):
-                    continue
-                reading = self._pattern.read(line)
-                self._locked = reading is not None or not self._settings.stream
-                self._tell(reading or self._none_in(line))
-        except TimeoutError:
-            self._fail(self._silence())
-        except (DeviceError, StopAsyncIteration) as error:
-            lost = LinkLost("no more lines come", device=self._device, remedy=REMEDY)
-            self._fail(error if isinstance(error, DeviceError) else lost)
-
-    def _silence(self) -> Silence:
-        return Silence(
-            f"no line for {self._settings.silence_s:g} s", device=self._device, remedy=REMEDY
-        )
+    def _read(self, line: str) -> Reading | DeviceError | None:
+        """What a line says: a reading, that there was none, or nothing."""
+        if self._pattern.ignores(line):
+            return None
+        reading = self._pattern.read(line)
+        self._locked = reading is not None or not self._settings.stream
+        return reading or self._none_in(line)
 
     def _none_in(self, line: str) -> BeamBroken:
         shown = line if len(line) <= 60 else f"{line[:57]}..."
@@ -225,36 +206,3 @@ class LineTracker:
             device=self._device,
             remedy="The SMR is out of the beam, or pattern in the site file does not fit the lines",
         )
-
-    @contextmanager
-    def _queue(self) -> "Iterator[asyncio.Queue[Reading | DeviceError]]":
-        """What is heard from now on."""
-        self.check()
-        heard: asyncio.Queue[Reading | DeviceError] = asyncio.Queue()
-        self._listeners.add(heard)
-        try:
-            yield heard
-        finally:
-            self._listeners.discard(heard)
-
-    async def _next(self, heard: "asyncio.Queue[Reading | DeviceError]") -> Reading:
-        """The next reading; raises what was heard instead of one, and Silence."""
-        try:
-            async with asyncio.timeout(self._settings.silence_s):
-                said = await heard.get()
-        except TimeoutError:
-            raise self._silence() from None
-        if isinstance(said, DeviceError):
-            raise said
-        return said
-
-    def _tell(self, said: "Reading | DeviceError") -> None:
-        for heard in self._listeners:
-            heard.put_nowait(said)
-
-    def _fail(self, error: DeviceError, say: bool = True) -> None:
-        if self._lost is None:
-            self._lost, self._locked = error, False
-            self._tell(error)
-            for callback in self._alarms if say else ():
-                callback(Alarm(self._device, error.what, error.remedy, fault=True))

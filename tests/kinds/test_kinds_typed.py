@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from app.cli import run as pkmcal
+from app.doubt import doubt
 from app.files.runs import read_run
 from app.jobs.entering import enter
-from app.jobs.typing_mistakes import doubt
 from calib.errors import BadInput
 
 POSES = "pose,x,y,z\nA,0,0,100\nB,60,0,100\nC,0,60,100\nD,-60,-20,110\n"

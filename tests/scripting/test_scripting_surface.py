@@ -14,7 +14,8 @@ import pkmcal
 
 SIGNATURES = {
     "choose_poses": "machine=None, n=29, *, site=None, criterion='I', priors=True, "
-    "heights=False, sigma_um=None, angle_mdeg=None, candidates=2500, seed=1, margin_mm=None",
+    "heights=False, calipers=0, calipers_um=20.0, sigma_um=None, angle_mdeg=None, candidates=2500, "
+    "seed=1, margin_mm=None",
     "compare": "runs, *, add=(), model=None, propose=None, watch=None",
     "complete": "machine, *, tool=False",
     "correct": "model, poses, *, machine=None, payload=None, temperature=None, channels=None, "
@@ -49,7 +50,8 @@ JOBS = {
     "decide=None, tell=None",
     "close": "self",
     "connect": "self",
-    "measure": "self, poses, *, order=None, reference_every=10, cycles=1, warm_up=True, title=''",
+    "measure": "self, poses, *, order=None, reference_every=10, cycles=1, warm_up=True, title='', "
+    "pairs=()",
     "propose": "self, fit, *, limits=None",
     "resume": "self, session=None",
     "sets": "self",
@@ -89,7 +91,7 @@ FIELDS = {
     "chi2_per_dof log10_p p_value axes nests worst not_in_model bad_readings left_out_readings "
     "remarks record advice",
     "PosesReport": "machine criterion readings tolerances_as_priors candidates seed predicted "
-    "random_poses by_count path_in_strokes kept_free poses",
+    "random_poses by_count path_in_strokes pairs with_pairs kept_free poses",
     "SessionReport": "session run readings",
     "SessionsReport": "sessions",
     "SetsReport": "sets unknown",

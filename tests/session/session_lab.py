@@ -11,7 +11,8 @@ from session_mock import POSES, site_text
 
 from app.clock import Clock
 from app.files.pose_table import Pose
-from app.files.site import Hands, Limits, Site, parse_site
+from app.files.site import Hands, Site, parse_site
+from app.files.site_limits import Limits
 from app.session.plan import Plan
 from app.session.plans import PlanOptions, measure_plan
 from app.session.session import Session

@@ -22,7 +22,7 @@ from app.session.session import Session
 from calib.errors import BadInput
 from drivers.errors import DeviceError
 
-ARGUMENTS = {"pose": "a", "nest": "3", "smr": 1}
+ARGUMENTS = {"pose": "a", "nest": "3", "smr": 1, "of": "a", "pose2": "a"}
 
 
 @pytest.fixture
@@ -116,12 +116,12 @@ async def test_a_step_in_work_is_left_out_unless_safety_needs_it(
 def test_what_no_journal_holds_is_done_every_time() -> None:
     """Who answers, whether the path is free, a ready tracker and drives that hold the machine."""
     every_time = {kind.name for kind in KINDS.values() if kind.every_time}
-    assert every_time == {"connect", "check-path", "tracker", "drives"}
+    assert every_time == {"connect", "check-path", "tracker", "gauge", "drives"}
 
 
 def test_what_safety_needs() -> None:
     needed = {kind.name for kind in KINDS.values() if not kind.skippable}
-    assert needed == {"connect", "check-path", "tracker", "drives", "rest"}
+    assert needed == {"connect", "check-path", "tracker", "gauge", "drives", "apart", "rest"}
 
 
 def stored_plan(site: Site) -> dict:

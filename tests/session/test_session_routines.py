@@ -155,7 +155,7 @@ async def test_a_tracker_that_forgot_is_initialised_and_told_its_reflector(lab: 
     work, tracker = lab.session.work, lab.tracker
     work.memory.settled = True
     work.station.site = replace(
-        work.site, tracker=replace(work.site.tracker, reflector="RRR 1.5in")
+        work.site, tracker_there=replace(work.site.tracker, reflector="RRR 1.5in")
     )
     tracker.fails = [NotReady("not initialised", device="tracker")]
     tracker.initialized = False

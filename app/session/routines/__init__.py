@@ -8,6 +8,8 @@ from app.session.kinds import StepKind
 from app.session.plan import Step
 from app.session.routines.carrying import carry, confirm
 from app.session.routines.directions import directions
+from app.session.routines.following import follows
+from app.session.routines.gauging import apart, between_marks, gauge, mark, touch
 from app.session.routines.moving import home, move
 from app.session.routines.preparing import check_path, connect, drives, rest, tracker, warm_up
 from app.session.routines.reading import read
@@ -34,4 +36,10 @@ ROUTINES: dict[StepKind, Routine] = {
     kinds.TWO_FACE: two_face,
     kinds.REST: rest,
     kinds.TRUTH: truth,
+    kinds.GAUGE: gauge,
+    kinds.TOUCH: touch,
+    kinds.FOLLOWS: follows,
+    kinds.APART: apart,
+    kinds.MARK: mark,
+    kinds.BETWEEN: between_marks,
 }

@@ -13,7 +13,7 @@ async def channels(work: Work) -> dict[str, float]:
     """
     asked, known = work.memory.channels
     if not known or work.clock.now() - asked > _CHANNELS_AGE_S:
-        tracker_says = await work.tracker.channels()
+        tracker_says = {} if work.site.gauge else await work.tracker.channels()
         payload = work.site.payload_kg
         typed = {} if payload is None else {"payload_kg": payload}
         known = {**typed, **tracker_says, **await work.controller.channels()}

@@ -46,7 +46,7 @@ async def connect(work: Work, step: Step) -> Done:
         )
     identities = {
         "controller": vars(work.controller.identity),
-        "tracker": vars(work.tracker.identity),
+        work.station.measures: vars(work.station.measuring.identity),
     }
     work.journal.set_meta(PARAMETERS, held.values)
     work.journal.set_meta(IDENTITIES, identities)
@@ -119,7 +119,7 @@ async def warm_up(work: Work, step: Step) -> Done:
     span, limit = work.limits.warm_up_s, work.limits.warm_up_K_per_min
     begun = work.clock.now()
     waited = False
-    while not (await work.tracker.state()).laser_warm:
+    while work.site.gauge is None and not (await work.tracker.state()).laser_warm:
         if not waited:
             work.suspended("the laser is not warm yet", "Wait; it takes minutes after power-on")
         waited = True

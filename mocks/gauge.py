@@ -1,0 +1,153 @@
+"""A gauge as it is in life: slow, of few digits, with an end to its travel and a battery.
+
+On a line it answers ``?`` with a number. A dial gauge sits in a nest of the platform and touches a
+plate on the base, which lies a little off and a little inclined; a telescopic ball bar is set
+between a nest of the platform and one of the base. Its zero is its own business.
+"""
+
+import asyncio
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from mocks.clock import ScaledClock
+from mocks.world import World
+
+LAG_S = 0.15
+"""Machine seconds with which it follows: e-fold."""
+NOISE_MM, STEP_MM = 0.0006, 0.001
+TRAVEL = {"dial": (0.0, 12.7), "bar": (-25.0, 25.0)}
+"""What it can show, mm."""
+BAR_MM, BAR_WRONG_MM = 300.0, 0.04
+"""Length of the bar at zero as its label says, and what the label is off by."""
+DIAL_AT_PLATE = 6.35
+PLATE_OFF_MM, PLATE_TILT = 0.25, (0.0012, -0.0008)
+_BACK = np.linspace(0.0, 4.0, 9)
+
+
+class GaugeMock:
+    """What the gauge shows; ``between`` are the nests that a bar is set between."""
+
+    def __init__(self, world: World, clock: ScaledClock, kind: str) -> None:
+        self._world, self._clock, self.kind = world, clock, kind
+        self._rng = np.random.default_rng([world.plan.seed, 61])
+        self.nest = next(iter(world.around.platform_nests))
+        self.between: tuple[str, str] | None = None
+        self._last = ""
+        self._count = 0
+        home = world.nest_in_base(self.nest, np.array([clock.now()]))[0]
+        self.plate_z = round(float(home[2]), 1)
+
+    def span(self, nest: str, nest2: str) -> None:
+        """Set it between two nests; raises ValueError for nests that are none."""
+        around = self._world.around
+        if nest not in around.platform_nests or nest2 not in around.base_nests:
+            raise ValueError(f"{nest} and {nest2} are no nests of platform and base")
+        self.between = (nest, nest2)
+
+    def line(self) -> str | None:
+        """What it answers; None: nothing."""
+        faults = self._world.faults
+        self._count += 1
+        if "gauge-silent" in faults:
+            return None
+        if "gauge-noise" in faults and self._count % 2:
+            return "\x00\xff#7&"
+        if "gauge-held" in faults and self._last:
+            return self._last
+        shown = self._shown()
+        low, high = TRAVEL[self.kind]
+        if shown is None or "gauge-over" in faults or not low <= shown <= high:
+            return "ERR 12 OVER RANGE"
+        shown = STEP_MM * round((shown + float(self._rng.normal(0.0, NOISE_MM))) / STEP_MM)
+        self._last = self._text(-shown if "gauge-reversed" in faults else shown)
+        return self._last
+
+    def _text(self, shown: float) -> str:
+        faults = self._world.faults
+        if "gauge-inch" in faults:
+            return f"{shown / 25.4:+.5f} in"
+        if "gauge-inch-untold" in faults:
+            return f"{shown / 25.4:+.5f}"
+        return f"{shown:+09.3f} mm"
+
+    def _shown(self) -> float | None:
+        """Lagging behind what is true, mm; None where it is set nowhere."""
+        now = self._clock.now()
+        true = self._true(np.maximum(now - LAG_S * _BACK, 0.0))
+        weight = np.exp(-_BACK)
+        return None if true is None else float(true @ weight / weight.sum())
+
+    def _true(self, times: np.ndarray[Any, Any]) -> np.ndarray[Any, Any] | None:
+        if self.kind == "bar":
+            if self.between is None:
+                return None
+            at = self._world.nest_in_base(self.between[0], times)
+            far = np.array(self._world.around.base_nests[self.between[1]])
+            return np.asarray(np.linalg.norm(at - far, axis=1) - BAR_MM - BAR_WRONG_MM)
+        at = self._world.nest_in_base(self.nest, times)
+        normal = np.array([*PLATE_TILT, 1.0])
+        above = (at - [0.0, 0.0, self.plate_z + PLATE_OFF_MM]) @ normal / np.linalg.norm(normal)
+        return np.asarray(DIAL_AT_PLATE - above)
+
+    def site(self) -> dict[str, Any]:
+        """What a site file says of it, and of the plate that it touches."""
+        common = {"sigma": 0.002, "lowest": TRAVEL[self.kind][0], "highest": TRAVEL[self.kind][1]}
+        if self.kind == "bar":
+            own = {"reads": "distance", "zero_at": BAR_MM, "zero_sigma": 0.1, "name": "bar"}
+            return {"gauge": {**common, **own}}
+        own = {
+            "reads": "direction", "nest": self.nest, "plane": "plate", "zero_at": DIAL_AT_PLATE,
+            "sign": -1, "zero_sigma": 20.0, "clearance_mm": 8.0, "name": "dial",
+        }  # fmt: skip
+        plate = {
+            "normal": [0.0, 0.0, 1.0], "through": [0.0, 0.0, self.plate_z], "sigma": 0.5,
+            "tilt_sigma": 0.003,
+        }  # fmt: skip
+        return {"gauge": {**common, **own}, "planes": {"plate": plate}}
+
+
+class GaugeServer:
+    """The gauge's line at ``host:port`` (port 0: any free one); it answers ``?``."""
+
+    def __init__(self, gauge: GaugeMock, host: str = "127.0.0.1", port: int = 0) -> None:
+        self.gauge = gauge
+        self._host, self._port = host, port
+        self._server: asyncio.Server | None = None
+        self._clients: set[asyncio.StreamWriter] = set()
+
+    @property
+    def address(self) -> str:
+        """``host:port``."""
+        return f"{self._host}:{self._port}"
+
+    async def start(self) -> None:
+        """Listen."""
+        self._server = await asyncio.start_server(self._serve, self._host, self._port)
+        self._port = self._server.sockets[0].getsockname()[1]
+
+    async def stop(self) -> None:
+        """Close everything."""
+        if self._server is not None:
+            self._server.close()
+        for client in tuple(self._clients):
+            client.transport.abort()
+
+    def site(self) -> dict[str, Any]:
+        """The tables of a site file."""
+        tables = self.gauge.site()
+        link = {"kind": "lines", "source": self.address, "unit": "mm", "ask": "?\\n"}
+        return {**tables, "gauge": {**link, "silence_s": 2.0, **tables["gauge"]}}
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._clients.add(writer)
+        try:
+            with suppress(OSError, ValueError):
+                while line := await reader.readline():
+                    if line.strip() == b"?" and (said := self.gauge.line()) is not None:
+                        writer.write(said.encode("latin-1") + b"\r\n")
+                        await writer.drain()
+        finally:
+            self._clients.discard(writer)
+            writer.close()
