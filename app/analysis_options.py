@@ -2,14 +2,11 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import click
 
 from app import answer
-
-if TYPE_CHECKING:
-    from calib.mechanism.description import Machine
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -101,15 +98,6 @@ def machine_options(function: _Function) -> _Function:
         "--closure", default="", help="Another closure of an over-constrained machine's file."
     )(function)
     return click.argument("machine_name", metavar="MACHINE")(function)
-
-
-def chosen_machine(machine_name: str, closure: str) -> "Machine":
-    """The machine that was named, closed as asked for."""
-    from app.files.machines import load_machine
-    from calib.mechanism.variants import with_closure
-
-    machine = load_machine(machine_name)
-    return with_closure(machine, closure) if closure else machine
 
 
 def bars(values: list[float], width: int = 24) -> list[str]:

@@ -19,8 +19,8 @@ from pathlib import Path
 
 from app.demo.station import mock_station
 from app.files.site import Site, load_site
+from app.session.facts import sessions_under
 from app.session.journal import Journal
-from app.session.listing import sessions_under
 from app.session.plans import PlanOptions, measure_plan
 from app.session.session import Session
 from bench._reliability_page import Row, write_row

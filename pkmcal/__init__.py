@@ -43,6 +43,8 @@ if TYPE_CHECKING:
     from app.jobs.completing import complete as complete
     from app.jobs.correcting import CorrectReport as CorrectReport
     from app.jobs.correcting import correct as correct
+    from app.jobs.device_kinds import KindsReport as KindsReport
+    from app.jobs.device_kinds import site_kinds as site_kinds
     from app.jobs.discovering import DiagnosisReport as DiagnosisReport
     from app.jobs.discovering import DiscoveryReport as DiscoveryReport
     from app.jobs.discovering import diagnose as diagnose
@@ -58,6 +60,8 @@ if TYPE_CHECKING:
     from app.jobs.guessing import guess_map as guess_map
     from app.jobs.importing import ImportReport as ImportReport
     from app.jobs.importing import import_run as import_run
+    from app.jobs.inspecting import MachineCheckReport as MachineCheckReport
+    from app.jobs.inspecting import check_machine as check_machine
     from app.jobs.kinematics import KinematicsReport as KinematicsReport
     from app.jobs.kinematics import kinematics as kinematics
     from app.jobs.listing import LogReport as LogReport
@@ -73,8 +77,14 @@ if TYPE_CHECKING:
     from app.jobs.posing import verification_grid as verification_grid
     from app.jobs.predicting import PredictReport as PredictReport
     from app.jobs.predicting import predict as predict
+    from app.jobs.repeating import Iso9283Report as Iso9283Report
+    from app.jobs.repeating import iso9283 as iso9283
+    from app.jobs.sensing import SensitivityReport as SensitivityReport
+    from app.jobs.sensing import sensitivity as sensitivity
     from app.jobs.simulating import SimulationReport as SimulationReport
     from app.jobs.simulating import simulate as simulate
+    from app.jobs.telling_apart import IdentifiabilityReport as IdentifiabilityReport
+    from app.jobs.telling_apart import identifiability as identifiability
     from app.jobs.verifying import VerificationReport as VerificationReport
     from calib.errors import BadInput as BadInput
     from drivers.errors import DeviceError as DeviceError
@@ -101,11 +111,16 @@ _HOMES = {
     "GridReport": "app.jobs.posing",
     "GuessReport": "app.jobs.guessing",
     "HistoryReport": "app.jobs.looking_back",
+    "IdentifiabilityReport": "app.jobs.telling_apart",
     "ImportReport": "app.jobs.importing",
+    "Iso9283Report": "app.jobs.repeating",
+    "KindsReport": "app.jobs.device_kinds",
     "KinematicsReport": "app.jobs.kinematics",
     "LogReport": "app.jobs.listing",
+    "MachineCheckReport": "app.jobs.inspecting",
     "PosesReport": "app.jobs.posing",
     "PredictReport": "app.jobs.predicting",
+    "SensitivityReport": "app.jobs.sensing",
     "SessionReport": "app.jobs.measuring",
     "SessionsReport": "app.jobs.listing",
     "SetsReport": "app.jobs.applying",
@@ -114,6 +129,7 @@ _HOMES = {
     "StoppedByOperator": "app.errors",
     "UndoReport": "app.jobs.applying",
     "VerificationReport": "app.jobs.verifying",
+    "check_machine": "app.jobs.inspecting",
     "choose_poses": "app.jobs.posing",
     "compare": "app.jobs.comparing",
     "complete": "app.jobs.completing",
@@ -126,15 +142,19 @@ _HOMES = {
     "fit_fleet": "app.jobs.fleet",
     "guess_map": "app.jobs.guessing",
     "history_of": "app.jobs.looking_back",
+    "identifiability": "app.jobs.telling_apart",
     "import_run": "app.jobs.importing",
+    "iso9283": "app.jobs.repeating",
     "kinematics": "app.jobs.kinematics",
     "list_sessions": "app.jobs.listing",
     "load_machine": "app.files.machines",
     "load_runs": "app.jobs.chosen_runs",
     "mock_station": "pkmcal.mock",
     "predict": "app.jobs.predicting",
+    "sensitivity": "app.jobs.sensing",
     "session_log": "app.jobs.listing",
     "simulate": "app.jobs.simulating",
+    "site_kinds": "app.jobs.device_kinds",
     "verification_grid": "app.jobs.posing",
 }
 """Where each public name is defined."""
@@ -158,12 +178,17 @@ __all__ = [
     "GridReport",
     "GuessReport",
     "HistoryReport",
+    "IdentifiabilityReport",
     "ImportReport",
+    "Iso9283Report",
+    "KindsReport",
     "KinematicsReport",
     "LogReport",
+    "MachineCheckReport",
     "NameTaken",
     "PosesReport",
     "PredictReport",
+    "SensitivityReport",
     "SessionReport",
     "SessionsReport",
     "SetsReport",
@@ -172,6 +197,7 @@ __all__ = [
     "StoppedByOperator",
     "UndoReport",
     "VerificationReport",
+    "check_machine",
     "choose_poses",
     "compare",
     "complete",
@@ -184,15 +210,19 @@ __all__ = [
     "fit_fleet",
     "guess_map",
     "history_of",
+    "identifiability",
     "import_run",
+    "iso9283",
     "kinematics",
     "list_sessions",
     "load_machine",
     "load_runs",
     "mock_station",
     "predict",
+    "sensitivity",
     "session_log",
     "simulate",
+    "site_kinds",
     "verification_grid",
 ]
 

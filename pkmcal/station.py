@@ -1,29 +1,23 @@
 """A station for scripts and notebooks: every call returns when its job is done."""
 
-import asyncio
-import threading
-from collections.abc import Callable, Coroutine, Mapping, Sequence
-from concurrent import futures
+from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Self
 
 from app.defaults import REFERENCE_EVERY
 from app.files.pose_table import Pose
 from app.files.site import Site
-from app.jobs.applying import AcceptReport, ApplyReport, SetsReport, UndoReport
 from app.jobs.automatic import AutoReport
 from app.jobs.chosen_runs import File
 from app.jobs.measuring import SessionReport
 from app.jobs.verifying import VerificationReport
 from app.session.events import Event
 from pkmcal.async_station import AsyncStation, Operator, Order
-
-_Answer = TypeVar("_Answer")
-_LOOK_S = 0.2
-"""How often a waiting call looks whether the user interrupted it."""
+from pkmcal.own_loop import OwnLoop
+from pkmcal.parameter_sets import ParameterSets
 
 
-class Station:
+class Station(ParameterSets):
     """One site's controller and tracker, for scripts: measure, verify, write back, undo.
 
     The devices are connected by :meth:`connect`, or by the first job, and stay connected until
@@ -71,8 +65,7 @@ class Station:
         watch: Callable[[Event], None] | None = None,
     ) -> None:
         self._station = AsyncStation(site, folder=folder, operator=operator, watch=watch)
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._thread: threading.Thread | None = None
+        self._loop = OwnLoop(self._station.stop)
 
     @property
     def site(self) -> Site:
@@ -105,24 +98,15 @@ class Station:
         DeviceError
             If a device does not answer, or is not the one that the site file names.
         """
-        self._wait(self._station.connect())
+        self._loop.wait(self._station.connect())
 
     def close(self) -> None:
         """Let go of the devices and of the machine."""
-        loop, thread = self._loop, self._thread
-        if loop is None or thread is None:
-            return
-        try:
-            self._wait(self._station.close())
-        finally:
-            loop.call_soon_threadsafe(loop.stop)
-            thread.join()
-            loop.close()
-            self._loop = self._thread = None
+        self._loop.close(self._station.close)
 
     def stop(self) -> None:
         """Stop all motion now, from another thread; the job under way ends: StoppedByOperator."""
-        self._wait(self._station.stop())
+        self._loop.wait(self._station.stop())
 
     def measure(
         self,
@@ -171,7 +155,7 @@ class Station:
         StoppedByOperator
             After Ctrl-C, :meth:`stop`, or where the operator said so.
         """
-        return self._wait(
+        return self._loop.wait(
             self._station.measure(
                 poses,
                 order=order,
@@ -199,7 +183,7 @@ class Station:
         DeviceError, GateRefused, StoppedByOperator
             As :meth:`measure`.
         """
-        return self._wait(self._station.resume(session))
+        return self._loop.wait(self._station.resume(session))
 
     def verify(
         self,
@@ -232,7 +216,7 @@ class Station:
         BadInput, DeviceError, GateRefused, StoppedByOperator
             As :meth:`measure`.
         """
-        return self._wait(
+        return self._loop.wait(
             self._station.verify(poses, truth=truth, reference_every=reference_every, before=before)
         )
 
@@ -289,138 +273,9 @@ class Station:
         StoppedByOperator
             After Ctrl-C, :meth:`stop`, or where ``decide`` said so; with ``out`` it goes on.
         """
-        return self._wait(
+        return self._loop.wait(
             self._station.auto(
                 target_um, hours=hours, first=first, apply=apply, seed=seed, out=out,
                 decide=decide, tell=tell,
             )
         )  # fmt: skip
-
-    def propose(self, fit: File, *, limits: Mapping[str, float] | None = None) -> ApplyReport:
-        """Compare a saved fit with the controller and ask the gates; nothing is written.
-
-        Parameters
-        ----------
-        fit : path
-            A model file (``found.save(...)``).
-        limits : mapping, optional
-            Other limits of gates, by name.
-
-        Returns
-        -------
-        ApplyReport
-            ``written`` is False.
-
-        Raises
-        ------
-        BadInput
-            If the fit cannot be read or is of another machine.
-        GateRefused
-            Naming every gate that did not pass.
-        DeviceError
-            If the controller does not hold what is known of it.
-        """
-        return self._wait(self._station.propose(fit, limits=limits))
-
-    def apply(
-        self, fit: File, *, yes: bool = False, limits: Mapping[str, float] | None = None
-    ) -> ApplyReport:
-        """Write a saved fit to the controller: gates, trial, check poses, and only then keep.
-
-        A snapshot is taken first. Any failure brings it back.
-
-        Parameters
-        ----------
-        fit : path
-            A model file (``found.save(...)``).
-        yes : bool
-            Keep what passes every gate. If False the operator is asked, ("keep", "put back").
-        limits : mapping, optional
-            Other limits of gates, by name, knowingly.
-
-        Returns
-        -------
-        ApplyReport
-            ``snapshot`` is what :meth:`undo` takes.
-
-        Raises
-        ------
-        BadInput
-            If the fit cannot be read, or neither ``yes`` nor an operator is there.
-        GateRefused
-            If a gate or the operator said no; the earlier set is back.
-        DeviceError
-            If something broke; the message says whether the earlier set is back.
-        StoppedByOperator
-            If the operator stopped; the earlier set is back.
-        """
-        return self._wait(self._station.apply(fit, yes=yes, limits=limits))
-
-    def undo(self, to: int | None = None) -> UndoReport:
-        """Bring a parameter set back to the controller, for good.
-
-        Parameters
-        ----------
-        to : int, optional
-            Its number; the one before the last :meth:`apply` if None.
-
-        Returns
-        -------
-        UndoReport
-
-        Raises
-        ------
-        BadInput
-            If there is no such set.
-        DeviceError
-            If it does not read back: the parameters are then unknown, and motion is blocked.
-        """
-        return self._wait(self._station.undo(to))
-
-    def accept(self) -> AcceptReport:
-        """Take what the controller holds as known; nothing is written.
-
-        Returns
-        -------
-        AcceptReport
-
-        Raises
-        ------
-        DeviceError
-            If its parameters cannot be read.
-        """
-        return self._wait(self._station.accept())
-
-    def sets(self) -> SetsReport:
-        """The parameter sets of this controller that this program knows of.
-
-        Returns
-        -------
-        SetsReport
-
-        Raises
-        ------
-        DeviceError
-            If the controller does not answer.
-        """
-        return self._wait(self._station.sets())
-
-    def _wait(self, job: Coroutine[Any, Any, _Answer]) -> _Answer:
-        """Do a job in the station's loop and wait; an interrupt stops the machine first."""
-        loop = self._started()
-        doing = asyncio.run_coroutine_threadsafe(job, loop)
-        while not doing.done():
-            try:
-                futures.wait([doing], timeout=_LOOK_S)
-            except KeyboardInterrupt:
-                asyncio.run_coroutine_threadsafe(self._station.stop(), loop)
-        return doing.result()
-
-    def _started(self) -> asyncio.AbstractEventLoop:
-        if self._loop is None:
-            self._loop = asyncio.new_event_loop()
-            self._thread = threading.Thread(
-                target=self._loop.run_forever, daemon=True, name="station"
-            )
-            self._thread.start()
-        return self._loop

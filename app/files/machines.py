@@ -9,6 +9,7 @@ from calib.errors import BadInput
 from calib.mechanism.check import require_sound
 from calib.mechanism.description import Machine
 from calib.mechanism.parse import parse_machine
+from calib.mechanism.variants import with_closure
 
 
 def shipped_machines() -> list[str]:
@@ -60,3 +61,9 @@ def _shipped(name: str) -> Machine:
     """A shipped machine; nobody can change it, and what is derived from it is derived once."""
     shipped = resources.files("calib.machines") / f"{name}.toml"
     return parse_machine(shipped.read_text(encoding="utf-8"), f"{name}.toml")
+
+
+def closed_machine(name_or_path: str, closure: str) -> Machine:
+    """Load a machine; with ``closure`` another closure of an over-constrained machine's file."""
+    machine = load_machine(name_or_path)
+    return with_closure(machine, closure) if closure else machine

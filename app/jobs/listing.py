@@ -6,8 +6,9 @@ from typing import ClassVar
 
 from app.jobs.chosen_runs import File
 from app.jobs.record import Record, Report
+from app.session.facts import facts_of, sessions_under
 from app.session.folder import latest_session
-from app.session.listing import facts_of, happenings, sessions_under
+from app.session.happenings import happenings
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -47,7 +47,7 @@ def remember_fit(fit: Fit, runs: Sequence[str]) -> None:
 def remember_verifications(root: Path) -> None:
     """Enter the finished verifications of a folder that are not in the history yet."""
     from app.history.store import Entry, History
-    from app.session.listing import sessions_under
+    from app.session.facts import sessions_under
     from app.verification import judge_session
 
     history = History(root)

@@ -334,7 +334,7 @@ class Journal:
         return [(row["time_s"], row["kind"], row["text"]) for row in rows]
 
     def noted(self, after: int = 0) -> list[tuple[str, float, str, str]]:
-        """UTC, time in s, kind and text of the notes after the first so many."""
+        """UTC, time in s, kind and text of every note after the first so many."""
         rows = self._db.execute(
             "SELECT utc, time_s, kind, text FROM notes WHERE seq > ? ORDER BY seq", (after,)
         )

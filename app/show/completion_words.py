@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from app import answer
+from app.show.text_table import text_table
 
 
 def completion_words(report: Mapping[str, Any]) -> str:
@@ -16,7 +16,7 @@ def completion_words(report: Mapping[str, Any]) -> str:
     entries = report["lacking"]
     if not entries:
         return f"{head}\nNothing is lacking: the file's parameters imitate every one of them."
-    table = answer.table(
+    table = text_table(
         ("error", "limb", "element", "behind joint", "beyond the file, um", ""),
         [
             (

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from app import answer
+from app.show.text_table import text_table
 from calib.analysis.benefit import Option
 from calib.analysis.gauge import Gauges
 from calib.analysis.identifiability import Identifiability, Relation
@@ -160,7 +160,7 @@ def _subset_words(subsets: Sequence[SubsetResult]) -> str:
         for s in subsets
     ]
     header = ["What is fitted", "unknowns", "independent", "position um", "orientation mdeg"]
-    return "Sensitivity is not identifiability. Predicted RMS at fresh poses:\n" + answer.table(
+    return "Sensitivity is not identifiability. Predicted RMS at fresh poses:\n" + text_table(
         header, rows
     )
 
@@ -177,4 +177,4 @@ def _option_words(benefits: Sequence[Option]) -> str:
         for o in benefits
     ]
     header = ["What is read", "rank", "identified", "position um", "orientation mdeg"]
-    return "What another reading would buy (with priors):\n" + answer.table(header, rows)
+    return "What another reading would buy (with priors):\n" + text_table(header, rows)

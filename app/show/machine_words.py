@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from app import answer
+from app.show.text_table import text_table
 from app.show.trait_words import trait_data, trait_words
 from calib.analysis.inspection import Inspection
 from calib.mechanism.check import pose_in_file
@@ -174,4 +174,4 @@ def _limits(found: Inspection) -> str:
             cells = [v * scale for v in (*joint.limits, low, high)]
             rows.append([name, unit, *(f"{cell:.2f}" for cell in cells)])
     header = ["Limits", "unit", "from", "to", "used from", "to"]
-    return answer.table(header, rows)
+    return text_table(header, rows)

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from app import answer
+from app.show.text_table import text_table
 
 
 def verdict(found: dict[str, Any]) -> str:
@@ -29,4 +29,4 @@ def verdict(found: dict[str, Any]) -> str:
             (name, f"{data['position_peak_um']:.1f}", "", f"{data['orientation_peak_deg']:.4f}", "")
         )
     head = ("", "peak um", "std um", "peak deg", "std deg")
-    return f"{found['poses']} poses\n" + answer.table(head, rows)
+    return f"{found['poses']} poses\n" + text_table(head, rows)

@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from app.session.listing import facts_of
+from app.session.facts import facts_of
 from app.tui.browsing import Browse
 from app.tui.dialogs import Choose, Enter, Pick
 from app.tui.face import Face

@@ -11,7 +11,7 @@ from textual.widgets import Static
 
 from app.files.site import Site
 from app.session.events import Connected
-from app.session.listing import SessionFacts, sessions_under
+from app.session.facts import SessionFacts, sessions_under
 from app.tui.browsing import Browse
 from app.tui.choosing import BROWSE, TYPE
 from app.tui.dialogs import Choose, Enter, Pick, is_site_file, site_candidates

@@ -13,7 +13,7 @@ from textual.widgets import Static
 
 from app.files.site import Site
 from app.session.events import NumberTaken
-from app.session.listing import facts_of
+from app.session.facts import facts_of
 from app.tui.dialogs import Pick
 from app.tui.face import Face
 from app.tui.machine_view import MachineView

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from app.history.store import History
 from app.report.issued import issued_for
-from app.session.listing import SessionFacts, sessions_under
+from app.session.facts import SessionFacts, sessions_under
 
 MOST = 200
 """How many of the newest sessions are looked at."""

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from textual.content import Content
 
-from app.session.listing import SessionFacts
+from app.session.facts import SessionFacts
 from app.show.clocks import clock
 from app.tui.next_step import JobStep
 

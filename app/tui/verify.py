@@ -10,7 +10,7 @@ from textual.containers import Horizontal, Vertical
 from textual.content import Content
 from textual.widgets import DataTable, Static
 
-from app.session.listing import facts_of
+from app.session.facts import facts_of
 from app.show.spans import duration
 from app.tui.choosing import ask_for_file
 from app.tui.dialogs import Choose, Pick

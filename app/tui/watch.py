@@ -8,7 +8,7 @@ from textual.binding import Binding, BindingType
 from textual.content import Content
 from textual.widgets import Static
 
-from app.session.listing import sessions_under
+from app.session.facts import sessions_under
 from app.tui.dialogs import Pick
 from app.tui.face import Face
 from app.tui.log import LogLines

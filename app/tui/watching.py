@@ -4,7 +4,8 @@ import asyncio
 import time
 from pathlib import Path
 
-from app.session.listing import Following, Happening, SessionFacts
+from app.session.facts import SessionFacts
+from app.session.happenings import Following, Happening
 from app.show.clocks import happening_line
 from app.tui.picture import Level, Picture
 

@@ -10,6 +10,7 @@ import click
 
 from app import answer
 from app.defaults import LIMITS
+from app.show.text_table import text_table
 from calib.digits import Digits, fixed
 from calib.errors import BadInput
 
@@ -144,7 +145,7 @@ def table(proposal: "Proposal") -> str:
     """
     rows = [_row(name, change) for name, change in _readable(proposal.changes)]
     head = ("parameter", "old", "new", "change", "sigma", "in sigmas", "unit", "")
-    lines = [answer.table(head, rows)] if rows else ["nothing to change"]
+    lines = [text_table(head, rows)] if rows else ["nothing to change"]
     lines += [f"not written: {name}: {why}" for name, why in proposal.left_out.items()]
     effects = dict.fromkeys(name.split(".")[0] for name in proposal.given_up)
     lines += [f"no longer compensated: {effect}: the fit does not have it" for effect in effects]

@@ -11,7 +11,7 @@ from app.plain_data import printable
 from app.show.clocks import happening_line
 
 if TYPE_CHECKING:
-    from app.session.listing import Following
+    from app.session.happenings import Following
 
 POLL_S = 0.5
 SILENT_S = 30.0
@@ -36,7 +36,7 @@ def command(session: Path | None, folder: Path) -> None:
     emergency stop.
     """
     from app.session.folder import latest_session
-    from app.session.listing import Following
+    from app.session.happenings import Following
 
     followed = Following(session if session is not None else latest_session(folder))
     facts = followed.facts

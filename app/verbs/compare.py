@@ -10,6 +10,7 @@ import click
 
 from app import answer
 from app.analysis_options import model_options, residuals_option, watcher, written_residuals
+from app.show.text_table import text_table
 from calib.digits import Digits
 
 SHOWN = 6
@@ -80,7 +81,7 @@ def words(report: dict[str, Any]) -> str:
         _repeats("reference nests", report["reference_repeatability"]),
         "",
         "What the residual depends on (p pays for having looked at all of them):",
-        answer.table(
+        text_table(
             ("variable", "p", "explains", "shows in", "period"),
             [_row(one) for one in report["structure"] if one["significant"]][:SHOWN]
             or [_row(one) for one in report["structure"]][:3],
@@ -117,7 +118,7 @@ def _terms(proposed: list[dict[str, Any]]) -> list[str]:
         )
         for one in proposed
     ]
-    return [answer.table(("proposed term", "explains", "found in halves", "file"), rows)]
+    return [text_table(("proposed term", "explains", "found in halves", "file"), rows)]
 
 
 def _repeats(what: str, repeats: dict[str, Any] | None) -> str:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from app import answer
+from app.show.text_table import text_table
 from calib.errors import BadInput
 from calib.quantity import quantity
 
@@ -183,7 +184,7 @@ def _words(report: "CorrectReport", sent: str) -> str:
         rows.append([one.pose_name, *(f"{v:.6f}" for v in values), *spread])
     inside = f"in the commands: {', '.join(report.effects) or 'geometry alone'}"
     header = ["", *_columns(report, sent), "+- um", "+- mdeg"]
-    lines = [f"{report.machine}; {inside}; mm and rad", "", answer.table(header, rows)]
+    lines = [f"{report.machine}; {inside}; mm and rad", "", text_table(header, rows)]
     far = [f"{one.pose_name}: {what}" for one in report.poses for what in one.outside]
     return "\n".join([*lines, *([""] if far else []), *far])
 

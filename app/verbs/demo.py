@@ -16,6 +16,7 @@ from app import answer
 from app.auto import Limits
 from app.demo.station import mock_station
 from app.errors import StoppedByOperator
+from app.show.text_table import text_table
 from app.verbs import auto
 
 if TYPE_CHECKING:
@@ -131,7 +132,7 @@ def command(
     answer.show(
         _json(outcome, time.monotonic() - began),
         as_json,
-        f"{answer.table(head, rows)}\n\nreport: {outcome.report}",
+        f"{text_table(head, rows)}\n\nreport: {outcome.report}",
     )
 
 

@@ -11,6 +11,7 @@ import click
 
 from app import answer
 from app.analysis_options import model_options, offer_options, offers
+from app.show.text_table import text_table
 from calib.defaults import FOLLOW_UP_FROM
 
 
@@ -89,11 +90,11 @@ def words(report: dict[str, Any]) -> str:
     return "\n".join(
         [
             f"telling {first} from {second}: probability of the right answer",
-            answer.table(("if the truth is", "now", "with the follow-up"), rows),
+            text_table(("if the truth is", "now", "with the follow-up"), rows),
             "",
             *(f"{name} must be {value:g}" for name, value in report["conditions"].items()),
             "in this order (the direction of approach is that of the way there):",
-            answer.table(header, poses),
+            text_table(header, poses),
             "",
             report["advice"],
         ]

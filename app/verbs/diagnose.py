@@ -18,6 +18,7 @@ from app.analysis_options import (
     watcher,
     written_residuals,
 )
+from app.show.text_table import text_table
 from calib.digits import plus_minus
 
 
@@ -68,7 +69,7 @@ def words(report: dict[str, Any]) -> str:
         f"{um(base['holdout_rms_um'])} (perfect {um(base['holdout_floor_um'])}), "
         f"chi-square per degree of freedom {base['chi2_per_dof']:.3f}",
         "",
-        answer.table(
+        text_table(
             ("effect", "p", "RMS after", "held-out after", "visible", "size"),
             [_row(candidate) for candidate in report["candidates"]],
         ),

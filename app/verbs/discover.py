@@ -18,6 +18,7 @@ from app.analysis_options import (
     watcher,
     written_residuals,
 )
+from app.show.text_table import text_table
 from app.verbs.diagnose import bad_lines, not_asked, sizes, um
 
 
@@ -83,7 +84,7 @@ def words(report: dict[str, Any]) -> str:
     ]
     lines = [
         *record_lines(report),
-        answer.table(
+        text_table(
             ("step", "RMS", "perfect", "held-out", "perfect", "chi2/dof", "p"),
             steps,
         ),

@@ -10,6 +10,7 @@ import click
 
 from app import answer
 from app.analysis_options import mask_option, model_options, residuals_option, written_residuals
+from app.show.text_table import text_table
 from calib.digits import Digits, fixed
 
 
@@ -58,11 +59,11 @@ def words(report: dict[str, Any]) -> str:
         *record_lines(report),
         f"{report['readings']} readings, effects: {', '.join(report['effects']) or 'none'}",
         "",
-        answer.table(("", "RMS", "perfect model"), _qualities(report)),
+        text_table(("", "RMS", "perfect model"), _qualities(report)),
         *_kinds(report),
         f"chi-square per degree of freedom {report['chi2_per_dof']:.3f} (1 is perfect)",
         "",
-        answer.table(
+        text_table(
             ("parameter", "value", "+-", "change", "in sigmas", "unit", ""),
             [_row(entry) for entry in report["parameters"]],
         ),
@@ -115,7 +116,7 @@ def _kinds(report: dict[str, Any]) -> list[str]:
         for one in kinds
     ]
     heads = ("kind", "readings", "RMS a component", "perfect model", "over perfect")
-    return ["", answer.table(heads, rows), ""]
+    return ["", text_table(heads, rows), ""]
 
 
 def _um(value: float | None) -> str:

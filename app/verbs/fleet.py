@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from app import answer
+from app.show.text_table import text_table
 
 FEW = 12
 """Parameters that are shown: those with the largest spread for their tolerance."""
@@ -110,11 +111,11 @@ def words(report: dict[str, Any]) -> str:
             f"{len(report['machines'])} of {report['machine']}, effects: "
             f"{', '.join(report['effects']) or 'none'}",
             "",
-            answer.table(heads, [machine_row(one) for one in report["machines"]]),
+            text_table(heads, [machine_row(one) for one in report["machines"]]),
             "",
             f"What is usual, the {len(few)} parameters with most spread for their tolerance "
             "(standard deviations):",
-            answer.table(
+            text_table(
                 ("parameter", "unit", "nominal", "usual", "spread", "tolerance", ""),
                 [parameter_row(one) for one in few],
             ),

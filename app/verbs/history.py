@@ -9,6 +9,7 @@ from app import answer
 from app.report.history_words import drift_words
 from app.report.words import with_uncertainty
 from app.show.clocks import clock
+from app.show.text_table import text_table
 
 if TYPE_CHECKING:
     from app.jobs.looking_back import MachineEntry, SeriesEntry
@@ -68,7 +69,7 @@ def words(machine: "MachineEntry", everything: bool = False) -> str:
         lines += ["", f"{said} {'' if rows else 'nothing'}".rstrip()]
         if rows:
             heads = ("  parameter", "before", "now", "change", "sigma", "unit", "p")
-            lines.append(answer.table(heads, rows))
+            lines.append(text_table(heads, rows))
     for one in (*machine.parameters, *((machine.errors,) if machine.errors else ())):
         if one.drift is not None and (one.drift.clear or everything):
             lines.append(f"  {one.name} moves {drift_words(one.drift, one.unit)}")

@@ -10,6 +10,7 @@ import click
 
 from app import answer
 from app.files.shipped_maps import shipped_maps
+from app.show.text_table import text_table
 from calib.errors import BadInput
 
 FILE = click.Path(path_type=Path, dir_okay=False)
@@ -93,7 +94,7 @@ def _guessed_words(report: dict[str, Any]) -> str:
     lines = [
         f"{report['map']}: a first map of {report['columns']} columns and {report['rows']} rows",
         "",
-        answer.table(header, rows) if rows else "no rows",
+        text_table(header, rows) if rows else "no rows",
         "",
         "Assumed:",
         *(f"  {one}" for one in report["assumed"]),

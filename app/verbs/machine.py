@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 from app import answer
-from app.analysis_options import chosen_machine, machine_options
+from app.analysis_options import machine_options
+from app.files.machines import closed_machine
 from app.machine_templates import TEMPLATES
 from app.show.completion_words import completion_words
 from calib.errors import BadInput
@@ -40,16 +41,10 @@ def check(machine_name: str, closure: str, seed: int, as_json: bool) -> None:
     Closure at home, mobility, constraints and redundancy, rank, limits and what of the workspace
     they keep out of reach. A file that cannot work ends with exit code 2, the line and a remedy.
     """
-    import numpy as np
+    from app.jobs.inspecting import check_machine
 
-    from app.show.machine_words import inspection_data, inspection_words
-    from calib.analysis.inspection import inspect
-    from calib.poses.verification import verification_poses
-
-    machine = chosen_machine(machine_name, closure)
-    found = inspect(machine, np.random.default_rng(seed))
-    grid = verification_poses(machine)
-    answer.show(inspection_data(found, grid), as_json, inspection_words(found, grid))
+    found = check_machine(machine_name, closure=closure, seed=seed)
+    answer.show(found.to_json(), as_json, found.text)
 
 
 @command.command()
@@ -65,7 +60,7 @@ def draw(machine_name: str, closure: str, pose: str, out: Path | None) -> None:
     from app.show.machine_sketch import draw_text
     from calib.analysis.skeleton import skeleton
 
-    machine = chosen_machine(machine_name, closure)
+    machine = closed_machine(machine_name, closure)
     configuration = _configuration(machine, pose)
     shape = skeleton(machine, configuration)
     if out:
@@ -210,7 +205,7 @@ def eds(machine_name: str, closure: str, out: Path | None, force: bool) -> None:
     """
     from mocks.canopen.make_eds import controller_eds
 
-    machine = chosen_machine(machine_name, closure)
+    machine = closed_machine(machine_name, closure)
     name, text = controller_eds(machine)
     path = out or Path(name)
     if path.exists() and not force:

@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from app import answer
+from app.show.text_table import text_table
 from calib.defaults import POSES_FROM
 from calib.errors import BadInput
 
@@ -126,7 +127,7 @@ def _text(report: dict[str, Any]) -> str:
         for one in report["by_count"]
         if one["n"] % 5 == 0
     ]
-    table = answer.table(["poses", "position um", "orientation mdeg"], rows)
+    table = text_table(["poses", "position um", "orientation mdeg"], rows)
     prior = "tolerances as priors" if report["tolerances_as_priors"] else "without priors"
     return (
         f"{report['machine']}: {count} of {report['candidates']} reachable poses, criterion "

@@ -10,6 +10,7 @@ import click
 
 from app import answer
 from app.analysis_options import written_residuals
+from app.show.text_table import text_table
 from calib.digits import fixed
 
 
@@ -59,7 +60,7 @@ def words(report: dict[str, Any]) -> str:
         f"chi-square per degree of freedom {_number(report['chi2_per_dof'])}, "
         f"p = {_chance(report['log10_p'])}",
         "",
-        answer.table(
+        text_table(
             ("axis of the base", "mean um", "RMS um", "expected um"),
             [
                 (a["axis"], _number(a["mean_um"]), _number(a["rms_um"]), _number(a["expected_um"]))
@@ -67,7 +68,7 @@ def words(report: dict[str, Any]) -> str:
             ],
         ),
         "",
-        answer.table(
+        text_table(
             ("nest", "on", "readings", "RMS um", "expected um"),
             [
                 (n["nest"], n["on"], str(n["readings"]), _number(n["rms_um"]),
@@ -76,7 +77,7 @@ def words(report: dict[str, Any]) -> str:
             ],
         ),
         "",
-        answer.table(
+        text_table(
             ("worst readings", "line", "nest", "dx um", "dy um", "dz um", "times expected"),
             [
                 (w["pose"] or w["run"], str(w["line"]), w["nest"],

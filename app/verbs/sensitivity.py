@@ -1,19 +1,16 @@
 """See which geometric errors matter, and what tolerances an accuracy asks for"""
 
-import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from app import answer
-from app.analysis_options import bars, chosen_machine, machine_options
-from calib.errors import BadInput
+from app.analysis_options import bars, machine_options
+from app.show.text_table import text_table
 
 if TYPE_CHECKING:
-    from calib.analysis.sensitivity import Index, Sensitivity, Tolerance
-
-DEGREE = math.radians(1.0)
+    from app.jobs.sensing import SensitivityReport
 
 
 @click.command()
@@ -52,105 +49,52 @@ def command(
     Sensitivity is not identifiability: what matters most need not be what a calibration can tell
     apart. See pkmcal identifiability.
     """
-    import numpy as np
+    from app.jobs.sensing import sensitivity
 
-    from calib.analysis.coverage import workspace_poses
-    from calib.analysis.sensitivity import sensitivity, tolerances
-
-    for value, option in ((position_um, "--position-um"), (orientation_mdeg, "--orientation-mdeg")):
-        if value is not None and value <= 0.0:
-            raise BadInput(f"{option} is {value:g}", remedy="Give a positive accuracy.")
-    machine = chosen_machine(machine_name, closure)
-    found = sensitivity(workspace_poses(machine, poses, np.random.default_rng(seed)))
-    wanted: tuple[Tolerance, ...] = ()
-    if position_um is not None or orientation_mdeg is not None:
-        wanted = tolerances(
-            found,
-            position=None if position_um is None else position_um * 1e-3,
-            orientation=None if orientation_mdeg is None else orientation_mdeg * 1e-3 * DEGREE,
-        )
-    if figure:
-        from app.show.charts import sensitivity_chart
-
-        sensitivity_chart(found.parameters if each else found.kinds, machine.name, figure)
-        answer.say(f"written to {figure}")
-    data = {
-        "format": "pkm-sensitivity/1",
-        "machine": machine.name,
-        "closure": closure or "own",
-        "poses": found.poses,
-        "parameters": [_data(i) for i in found.parameters],
-        "kinds": [_data(i) for i in found.kinds],
-        "within_tolerances": {
-            "position_rms_mm": found.position_sigma,
-            "orientation_rms_deg": found.orientation_sigma / DEGREE,
-        },
-        "tolerances": [_tolerance(t) for t in wanted],
-    }
-    answer.show(data, as_json, _text(found, machine.name, wanted, each))
-
-
-def _per(unit: str) -> tuple[str, float]:
-    """Unit in which an error is told, and how much of the machine file's unit it is."""
-    return ("deg", DEGREE) if unit == "rad" else (unit, 1.0)
-
-
-def _data(index: "Index") -> dict[str, Any]:
-    unit, factor = _per(index.unit)
-    return {
-        "name": index.name,
-        "per": unit,
-        "position_mm": index.position * factor,
-        "position_spread_mm": index.position_spread * factor,
-        "orientation_deg": index.orientation * factor / DEGREE,
-        "orientation_spread_deg": index.orientation_spread * factor / DEGREE,
-        "tolerance": index.tolerance / factor,
-        "position_share_mm": index.position_share,
-        "orientation_share_deg": index.orientation_share / DEGREE,
-    }
-
-
-def _tolerance(tolerance: "Tolerance") -> dict[str, Any]:
-    unit, factor = _per(tolerance.unit)
-    return {
-        "kind": tolerance.kind,
-        "unit": unit,
-        "alone": tolerance.alone / factor,
-        "shared": tolerance.shared / factor,
-    }
-
-
-def _text(found: "Sensitivity", machine: str, wanted: "tuple[Tolerance, ...]", each: bool) -> str:
-    indices = found.parameters if each else found.kinds
-    drawn = bars([i.position_share + 1e-300 for i in indices])
-    rows = []
-    for index, bar in zip(indices, drawn, strict=True):
-        unit, factor = _per(index.unit)
-        rows.append(
-            [
-                index.name,
-                f"/{unit}",
-                f"{index.position * factor:.4f}",
-                f"{index.position_spread * factor:.4f}",
-                f"{index.orientation * factor / DEGREE:.4f}",
-                f"{index.orientation_spread * factor / DEGREE:.4f}",
-                f"{index.tolerance / factor:.3g}",
-                f"{index.position_share * 1e3:.1f}",
-                bar.ljust(24),
-            ]
-        )
-    header = ["error", "per", "mm", "+-", "deg", "+-", "tolerance", "um", "".ljust(24)]
-    text = (
-        f"{machine}: mean and spread over {found.poses} poses of the pose error per unit of each "
-        f"{'error' if each else 'kind of error (all limbs)'};\num: what its tolerance causes, "
-        f"1 sigma\n\n{answer.table(header, rows)}\n\nA machine within its tolerances: position "
-        f"{found.position_sigma:.3f} mm, orientation {found.orientation_sigma / DEGREE:.3f} deg RMS"
+    found = sensitivity(
+        machine_name,
+        closure=closure,
+        position_um=position_um,
+        orientation_mdeg=orientation_mdeg,
+        poses=poses,
+        seed=seed,
     )
-    if wanted:
+    if figure:
+        found.draw(figure, each=each)
+        answer.say(f"written to {figure}")
+    answer.show(found.to_json(), as_json, _text(found, each))
+
+
+def _text(found: "SensitivityReport", each: bool) -> str:
+    indices = found.parameters if each else found.kinds
+    drawn = bars([one.position_share_mm + 1e-300 for one in indices])
+    rows = [
+        [
+            one.name,
+            f"/{one.per}",
+            f"{one.position_mm:.4f}",
+            f"{one.position_spread_mm:.4f}",
+            f"{one.orientation_deg:.4f}",
+            f"{one.orientation_spread_deg:.4f}",
+            f"{one.tolerance:.3g}",
+            f"{one.position_share_mm * 1e3:.1f}",
+            bar.ljust(24),
+        ]
+        for one, bar in zip(indices, drawn, strict=True)
+    ]
+    header = ["error", "per", "mm", "+-", "deg", "+-", "tolerance", "um", "".ljust(24)]
+    within = found.within_tolerances
+    text = (
+        f"{found.machine}: mean and spread over {found.poses} poses of the pose error per unit of "
+        f"each {'error' if each else 'kind of error (all limbs)'};\num: what its tolerance causes, "
+        f"1 sigma\n\n{text_table(header, rows)}\n\nA machine within its tolerances: position "
+        f"{within.position_rms_mm:.3f} mm, orientation {within.orientation_rms_deg:.3f} deg RMS"
+    )
+    if found.tolerances:
         rows = [
-            [t["kind"], t["unit"], f"{t['alone']:.4g}", f"{t['shared']:.4g}"]
-            for t in map(_tolerance, wanted)
+            [one.kind, one.unit, f"{one.alone:.4g}", f"{one.shared:.4g}"]
+            for one in found.tolerances
         ]
         header = ["kind", "unit", "+- if alone", "+- if shared"]
-        text += f"\n\nTolerances for the wanted accuracy:\n\n{answer.table(header, rows)}"
+        text += f"\n\nTolerances for the wanted accuracy:\n\n{text_table(header, rows)}"
     return text

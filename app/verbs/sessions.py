@@ -7,6 +7,7 @@ import click
 
 from app import answer
 from app.show.clocks import clock
+from app.show.text_table import text_table
 
 if TYPE_CHECKING:
     from app.jobs.listing import SessionEntry
@@ -25,7 +26,7 @@ def command(folder: Path, as_json: bool) -> None:
     heads = ("session", "begun", "what", "state", "machine", "poses", "readings", "title")
     width = max((len(one.title) for one in found.sessions), default=0)
     rows = [_row(one, width) for one in found.sessions]
-    text = answer.table((*heads[:-1], heads[-1].ljust(width)), rows)
+    text = text_table((*heads[:-1], heads[-1].ljust(width)), rows)
     answer.show(found.to_json(), as_json, text if rows else f"no session in {folder}")
 
 

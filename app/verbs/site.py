@@ -7,7 +7,6 @@ import click
 
 from app import answer
 from app.plain_data import printable
-from calib.errors import BadInput
 from drivers.kind import Kind, Setting, Takes
 
 TAKES: dict[Takes, str] = {
@@ -36,20 +35,10 @@ def kinds(name: str | None, as_json: bool) -> None:
 
     Kinds of installed packages are listed like those that ship.
     """
-    from app.devices import all_kinds
+    from app.jobs.device_kinds import kinds_called, site_kinds
 
-    found = [(role, kind, declared) for role, kind, declared in all_kinds()]
-    chosen = [entry for entry in found if name in (None, entry[1])]
-    if not chosen:
-        raise BadInput(
-            f"no kind of device is called {name!r}",
-            remedy=f"There are {', '.join(kind for _, kind, _ in found)}",
-        )
-    data = {
-        "format": "pkm-kinds/1",
-        "kinds": [_data(role, kind, declared) for role, kind, declared in chosen],
-    }
-    answer.show(data, as_json, _words(chosen, in_full=name is not None))
+    words = _words(kinds_called(name), in_full=name is not None)
+    answer.show(site_kinds(name).to_json(), as_json, words)
 
 
 @command.command()
@@ -66,25 +55,6 @@ def check(site_file: Path) -> None:
         f"{len(site.platform_nests)} nests on the platform, {len(site.base_nests)} on the base"
     )
     click.echo(printable(said))
-
-
-def _data(role: str, name: str, kind: Kind[Any]) -> dict[str, Any]:
-    return {
-        "role": role,
-        "kind": name,
-        "says": kind.says,
-        **({"takes": kind.takes} if role == "controller" else {}),
-        "settings": [
-            {
-                "name": one.name,
-                "form": one.form,
-                "required": one.required,
-                "default": None if one.required else one.default,
-                "says": one.says,
-            }
-            for one in kind.settings
-        ],
-    }
 
 
 def _words(chosen: list[tuple[Any, str, Kind[Any]]], in_full: bool) -> str:

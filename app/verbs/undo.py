@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from app import answer
+from app.show.text_table import text_table
 
 if TYPE_CHECKING:
     from app.jobs.applying import SetsReport
@@ -78,7 +79,7 @@ def _listed(report: "SetsReport") -> tuple[dict[str, Any], str]:
         )
         for s in report.sets
     ]  # fmt: skip
-    lines = [answer.table(("set", "taken (UTC)", "checksum", "", "why"), rows)] if rows else []
+    lines = [text_table(("set", "taken (UTC)", "checksum", "", "why"), rows)] if rows else []
     if report.unknown:
         lines.append(f"PARAMETERS UNKNOWN, motion is blocked: {report.unknown}")
     empty = "no sets yet: nothing was applied to this controller"

@@ -14,8 +14,8 @@ from app.history.store import Entry, History
 from app.jobs.listing import list_sessions, session_log
 from app.jobs.looking_back import history_of
 from app.session.folder import make_folder
+from app.session.happenings import Following
 from app.session.journal import IDENTITIES, Journal
-from app.session.listing import Following
 from app.session.plans import PlanOptions, measure_plan
 from calib.trend import change, drift, family_wise
 from tests.answers import faults_of

@@ -79,6 +79,22 @@ QUESTIONS: dict[str, tuple[Callable[[str], Report], Callable[[str], list[str]]]]
         lambda r: pkmcal.verification_grid("hexapod"),
         lambda r: ["poses", "hexapod", "--verification"],
     ),
+    "machine check": (
+        lambda r: pkmcal.check_machine("tripod"),
+        lambda r: ["machine", "check", "tripod"],
+    ),
+    "sensitivity": (
+        lambda r: pkmcal.sensitivity("tripod", poses=5, position_um=100.0),
+        lambda r: ["sensitivity", "tripod", "--poses", "5", "--position-um", "100"],
+    ),
+    "identifiability": (
+        lambda r: pkmcal.identifiability("tripod", poses=8, read="positions", base_nests=False),
+        lambda r: [
+            *("identifiability", "tripod", "--poses", "8", "--read", "positions"),
+            "--no-base-nests",
+        ],
+    ),
+    "site kinds": (lambda r: pkmcal.site_kinds("gcs"), lambda r: ["site", "kinds", "gcs"]),
 }
 
 

@@ -13,6 +13,7 @@ import pytest
 import pkmcal
 
 SIGNATURES = {
+    "check_machine": "machine, *, closure='', seed=1",
     "choose_poses": "machine=None, n=29, *, site=None, criterion='I', priors=True, "
     "heights=False, calipers=0, calipers_um=20.0, sigma_um=None, angle_mdeg=None, candidates=2500, "
     "seed=1, margin_mm=None",
@@ -29,15 +30,21 @@ SIGNATURES = {
     "fit": "runs, *, add=(), model=None, mask=()",
     "guess_map": "files, out, *, machine=None",
     "history_of": "folder='sessions', *, serial='', tolerance_um=None",
+    "identifiability": "machine, *, closure='', read='nests', nests=3, site=None, sigma_um=None, "
+    "frame_free=True, nests_free=False, base_nests=True, poses=None, only=(), seed=1",
     "import_run": "files, map, run, *, machine=None, header=None, commands=None, "
     "as_it_stands=False",
+    "iso9283": "run, *, point='', pairs=''",
     "kinematics": "machine, file, direction, *, model=None",
     "list_sessions": "folder='sessions'",
     "load_machine": "name_or_path, relative_to=None",
     "load_runs": "runs",
     "mock_station": "machine='hexapod', *, seed=1, scale=600.0, effects=None, folder=None",
     "predict": "model, runs, *, frame=False",
+    "sensitivity": "machine, *, closure='', position_um=None, orientation_mdeg=None, poses=500, "
+    "seed=1",
     "session_log": "session=None, *, folder='sessions'",
+    "site_kinds": "name=None",
     "simulate": "machine, run, *, seed=1, poses=60, noise_um=None, effects=None, hidden=None, "
     "truth=None, parameters=None, controller=None, cycles=1, order='nest-by-nest', payload=(), "
     "rise=6.0, delays=False, strays=0, title=''",
@@ -84,6 +91,16 @@ FIELDS = {
     "GridReport": "machine workspace_scale box poses",
     "GuessReport": "map columns rows preview assumed missing",
     "HistoryReport": "machines",
+    "IdentifiabilityReport": "machine closure readings poses unknowns rank weak smallest_kept "
+    "singular_values base_parameters relations exact_groups identified unidentified sigma_ratio "
+    "gauge subsets options",
+    "Iso9283Report": "machine point frame left_out poses distances largest",
+    "KindsReport": "kinds",
+    "MachineCheckReport": "machine limbs parameters actuators task home_gap_mm home_gap_rad "
+    "home_pose constraints redundant freedoms_held mobility rank stiffness_home stiffness_least "
+    "reach stopped_by used verification_box verification_scale closures traits_stated traits "
+    "effects not_on_this_machine",
+    "SensitivityReport": "machine closure poses parameters kinds within_tolerances tolerances",
     "ImportReport": "runs machine map rows readings poses assumed record",
     "KinematicsReport": "machine model direction actuators units places",
     "LogReport": "session entries",

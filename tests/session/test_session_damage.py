@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from app.session import kinds
+from app.session.facts import facts_of, sessions_under
 from app.session.journal import Journal, NewRow
-from app.session.listing import facts_of, sessions_under
 from app.session.plan import Plan, Step
 from calib.errors import BadInput
 
