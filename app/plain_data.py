@@ -19,6 +19,11 @@ def plain(value: Any) -> Any:
 
     Numbers that are not finite become None, numpy numbers and arrays plain ones.
     """
+    kind = type(value)  # what there is most of goes first: answers have thousands of numbers
+    if kind is float:
+        return value if math.isfinite(value) else None
+    if kind is list:
+        return [plain(item) for item in value]
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, str) or value is None or isinstance(value, bool):

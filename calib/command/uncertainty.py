@@ -50,6 +50,7 @@ def pose_covariance(
     columns = pose_columns(identified, at)
     kept = [k for k, name in enumerate(names) if name in columns]
     stacked = np.array([columns[names[k]] for k in kept])
-    return np.asarray(
-        np.einsum("pcn,pq,qdn->cdn", stacked, covariance[np.ix_(kept, kept)], stacked)
-    )
+    count = at.situation.rows.count
+    stacked = stacked.reshape(len(kept), 6, count)
+    spread = covariance[np.ix_(kept, kept)] @ stacked.reshape(len(kept), -1)
+    return np.asarray(np.einsum("pcn,pdn->cdn", stacked, spread.reshape(stacked.shape)))
