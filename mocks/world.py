@@ -22,6 +22,7 @@ from mocks.physics.motion import LegMotion
 from mocks.physics.pose import Array, Pose, rotation_from_vector
 from mocks.physics.room import HOME_REFLECTOR, Distortions, Station
 from mocks.physics.signals import Steps
+from mocks.physics.stand import Stand
 from mocks.physics.truth import draw_parameters
 from mocks.smrs import BIRDBATH, HAND, Smrs
 
@@ -65,6 +66,7 @@ class World:
             dict(given) if given is not None else draw_parameters(self.machine, plan.seed)
         )
         self._real = self.body.real(self.parameters, plan.hidden, self.load, True)
+        self._stand = Stand(plan.hidden, self.body, self.load)
         self.faults = FaultSet()
         self.climate = Climate(plan.seed)
         self.station = Station(plan.seed, self.around.place)
@@ -122,7 +124,7 @@ class World:
             self.faults.inject("jammed")
             return start
         self._last = Pose(pose.position[-1:], pose.rotation[-1:])
-        return pose
+        return self._stand.under(pose, circumstances.payload)
 
     def encoder_extension(self) -> Array:
         """Extension of every actuator as its encoder reads it now, (n,), mm or rad."""

@@ -246,7 +246,9 @@ def numbers_of(text: str, count: int, place: str) -> Array:
     if len(values) != count:
         what = "three numbers" if count == 3 else "a number"
         raise BadInput(
-            f'"{text}" is not {what}', place=place, remedy="Write x y z" if count == 3 else ""
+            f"{in_short(text)} is not {what}",
+            place=place,
+            remedy="Write x y z" if count == 3 else "Write one number",
         )
     return np.array(values)
 

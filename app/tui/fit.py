@@ -172,7 +172,9 @@ def words(answer: "FitAnswer | None") -> Content:
     ]
     if report["left_out_readings"]:
         parts.append(
-            Content(f"{report['left_out_readings']} readings lack a channel that an effect needs.")
+            Content(
+                f"{report['left_out_readings']} readings lack a channel or [load] of an effect."
+            )
         )
     groups = list(zip(report["unidentified"], report["unidentified_words"], strict=True))
     parts += [Content(f"{sentence}.") for group, sentence in groups if len(group) > 1]

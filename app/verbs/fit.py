@@ -78,7 +78,10 @@ def words(report: dict[str, Any]) -> str:
         lines += ["", "Excluded readings:"]
         lines += [f"  {line}" for line in excluded_lines(report)]
     if report["left_out_readings"]:
-        lines += ["", f"{report['left_out_readings']} readings lack a channel that an effect needs"]
+        lines += [
+            "",
+            f"{report['left_out_readings']} readings lack a channel or [load] of an effect",
+        ]
     for name, why in report["channels_left_aside"].items():
         lines += ["", f"Column {name} is not a channel: {why}"]
     return "\n".join(lines)

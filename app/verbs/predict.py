@@ -92,7 +92,10 @@ def words(report: dict[str, Any]) -> str:
     if report["bad_readings"]:
         lines += ["", "Excluded readings:", *(f"  {line}" for line in excluded_lines(report))]
     if report["left_out_readings"]:
-        lines += ["", f"{report['left_out_readings']} readings lack a channel that an effect needs"]
+        lines += [
+            "",
+            f"{report['left_out_readings']} readings lack a channel or [load] of an effect",
+        ]
     lines += [f"{one}." for one in report["remarks"]]
     return "\n".join([*lines, "", report["advice"]])
 

@@ -14,7 +14,7 @@ itself is the sum of unknown times derivative over the linear unknowns. An effec
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -184,6 +184,9 @@ class Effect(ABC):
         if it matters how long the machine stood): it reads ``situation.rows.path``.
     ends_with_run : bool
         Whether what happened at some moment is over when its run ends: no follow-up sees it.
+    beside : tuple of str
+        Effects of which one must be in the model before this one is asked: what they explain in
+        the main, and this one to the end. Empty for what is asked at once.
     wrong_sign : str
         What a negative value most likely says of the record; empty where both signs can be.
     wrong_size : str
@@ -196,6 +199,7 @@ class Effect(ABC):
     channels: tuple[str, ...] = ()
     depends: tuple[str, ...] = ()
     ends_with_run: bool = False
+    beside: tuple[str, ...] = ()
     wrong_sign: str = ""
     wrong_size: str = ""
 
@@ -234,6 +238,10 @@ class Effect(ABC):
     def trials(self, rows: Rows) -> Iterator[tuple[float, ...]]:
         """Values of the nonlinear unknowns to be searched, in the order of the unknowns."""
         yield ()
+
+    def trials_beside(self, rows: Rows, held: Mapping[str, Array]) -> Iterator[tuple[float, ...]]:
+        """The same once effects are in the model, by their values (U,); all of them if not said."""
+        yield from self.trials(rows)
 
     def closure(self, machine: Machine, values: Array) -> Machine:
         """Machine that is closed while the effect is in the model, if not the plain one."""

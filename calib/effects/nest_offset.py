@@ -25,27 +25,31 @@ class NestOffset(Effect):
         """``nest-offset.4.x`` ..., mm, platform frame."""
         return tuple(
             Unknown(f"nest-offset.{name}.{axis}", "mm", SIGMA_MM, sigma=SIGMA_MM)
-            for name in _nests(rows)
+            for name in nests_of(rows)
             for axis in "xyz"
         )
 
     def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
         """Each nest alone."""
-        return alone(len(_nests(rows)), 3)
+        return alone(len(nests_of(rows)), 3)
 
     def signature(self, situation: Situation, values: Array) -> Signature:
         """A unit step of one nest along one platform axis."""
-        rows = situation.rows
-        names = _nests(rows)
-        shape = np.zeros((3 * len(names), 3, rows.count))
-        which = np.array([names.index(n) if n in names else -1 for n in rows.nest_name])
-        for nest in range(len(names)):
-            for axis in range(3):
-                shape[3 * nest + axis, axis] = which == nest
-        return Signature(nest=shape)
+        return Signature(nest=nest_steps(situation.rows))
 
 
-def _nests(rows: Rows) -> list[str]:
+def nest_steps(rows: Rows) -> Array:
+    """Unit steps (3 nests, 3, N) of each nest along each platform axis."""
+    names = nests_of(rows)
+    shape = np.zeros((3 * len(names), 3, rows.count))
+    which = np.array([names.index(n) if n in names else -1 for n in rows.nest_name])
+    for nest in range(len(names)):
+        for axis in range(3):
+            shape[3 * nest + axis, axis] = which == nest
+    return shape
+
+
+def nests_of(rows: Rows) -> list[str]:
     """Platform nests that hold readings, in the order of the drawing."""
     seen = {name for name, on in zip(rows.nest_name, rows.on_platform, strict=True) if on}
     listed = dict.fromkeys(name for run in rows.runs for name in run.header.platform_nests)

@@ -40,7 +40,7 @@ class ScrewCyclic(Effect):
             for axis in axes
             for wave in ("sin", "cos")
         )
-        if self._given_period(rows.machine) is not None:
+        if self.given_period(rows.machine) is not None:
             return waves
         return (*waves, Unknown(f"{self.id}.period", axes[0].unit, 1.0, nonlinear=True))
 
@@ -50,7 +50,7 @@ class ScrewCyclic(Effect):
 
     def trials(self, rows: Rows) -> Iterator[tuple[float, ...]]:
         """Equidistant frequencies, dense enough that none falls between two."""
-        if self._given_period(rows.machine) is not None:
+        if self.given_period(rows.machine) is not None:
             yield ()
             return
         which = self.axes(rows.machine)
@@ -64,7 +64,7 @@ class ScrewCyclic(Effect):
 
     def scan(self, situation: Situation, trials: Sequence[tuple[float, ...]]) -> Scan | None:
         """Sines and cosines of every trial's period."""
-        if self._given_period(situation.machine) is not None:
+        if self.given_period(situation.machine) is not None:
             return None
         which, s = self.axes(situation.machine), situation.rows.extension
         periods = np.array(trials)[:, 0, None, None]
@@ -80,7 +80,7 @@ class ScrewCyclic(Effect):
     def signature(self, situation: Situation, values: Array) -> Signature:
         """Sine and cosine, and the derivative by the period."""
         which, s = self.axes(situation.machine), situation.rows.extension
-        given = self._given_period(situation.machine)
+        given = self.given_period(situation.machine)
         period = float(values[-1]) if given is None else given
         phase = 2.0 * np.pi * s[which] / period
         n = which.size
@@ -94,7 +94,8 @@ class ScrewCyclic(Effect):
             shape[-1, which] = -slope * phase / period
         return Signature(extension=shape)
 
-    def _given_period(self, machine: Machine) -> float | None:
+    def given_period(self, machine: Machine) -> float | None:
+        """The period that the machine file states; None where it is searched for."""
         table = machine.extra.get("effects")
         own = table.get(self.id) if isinstance(table, dict) else None
         period = own.get("period") if isinstance(own, dict) else None

@@ -59,16 +59,25 @@ class EffectColumns:
         return values
 
 
-def effect_columns(fit: Fit, effects: Sequence[Effect]) -> list[EffectColumns]:
-    """Signatures of every effect that these readings can show and the model does not hold."""
+def effect_columns(
+    fit: Fit, effects: Sequence[Effect], *, asked: bool = False
+) -> list[EffectColumns]:
+    """Signatures of every effect that these readings can show and the model does not hold.
+
+    Effects that are asked beside others are left out where none of these is held, unless somebody
+    has ``asked`` for them.
+    """
     rows = fit.model.rows
-    held = {effect.id for effect in fit.model.effects}
+    values = fit.linear.state.effects
+    held = {effect.id: own for effect, own in zip(fit.model.effects, values, strict=True)}
     # A moment with nothing but excluded readings on one side could not be told from any other.
     tried = rows if fit.accepted.all() else rows.take(fit.accepted)
     return [
-        columns_at(fit, effect, tuple(effect.trials(tried)))
+        columns_at(fit, effect, tuple(effect.trials_beside(tried, held)))
         for effect in effects
-        if effect.id not in held and not effect.unavailable(rows)
+        if effect.id not in held
+        and (asked or not effect.beside or not held.keys().isdisjoint(effect.beside))
+        and not effect.unavailable(rows)
     ]
 
 

@@ -40,7 +40,7 @@ def fit_effects(
         if not any(unknown.nonlinear for unknown in effects[count].unknowns(rows)):
             continue
         latest = _fitted(rows, effects[:count], masked, latest)
-        (one,) = effect_columns(latest, [effects[count]])
+        (one,) = effect_columns(latest, [effects[count]], asked=True)
         start = _searched(latest, one)
         model = Model(rows, effects[: count + 1])
         latest = fit(model, start=start, masked=masked, gross=latest.gross)

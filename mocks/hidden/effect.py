@@ -77,6 +77,9 @@ class Physics:
     nest
         Displacement (N, 3) of a nest in the frame that carries it, at times (N,) s; ``down``
         (N, 3) is the direction of gravity there.
+    stand
+        Motion (N, 6) of the machine against the base frame, mm and rad (small), under the weight:
+        force (N, 3) in N and moment (N, 3) in N mm about the base origin.
     base
         Displacement (N, 3) of points (N, 3) of the base frame at times (N,).
     seen
@@ -88,6 +91,7 @@ class Physics:
     compliance: Callable[[Circumstances], Array] | None = None
     friction: Callable[[Circumstances], Array] | None = None
     nest: Callable[[Nest, Array, Array], Array] | None = None
+    stand: Callable[[Array, Array], Array] | None = None
     base: Callable[[Array, Array], Array] | None = None
     seen: Callable[[Array, Array, float | None], Array] | None = None
 

@@ -10,6 +10,7 @@ from mocks.physics.body import Body
 from mocks.physics.circumstances import Circumstances
 from mocks.physics.play import follow
 from mocks.physics.pose import Array, Pose
+from mocks.physics.stand import Stand
 from mocks.physics.truth import nominal_parameters
 from mocks.simulate.layout import HOME, Layout
 from mocks.simulate.plan import RunPlan
@@ -80,7 +81,8 @@ def true_poses(
         time=time,
     )
     real = body.real(parameters, plan.hidden, load, settles=False)
-    return real.poses(circumstances, real.home(len(extension)))
+    pose = real.poses(circumstances, real.home(len(extension)))
+    return Stand(plan.hidden, body, load).under(pose, circumstances.payload)
 
 
 def _last_step(extension: Array, smallest: float) -> Array:
