@@ -217,6 +217,19 @@ def _remedy(cell: str, layout: Layout) -> str:
                     f'Expected a number with "{layout.decimal}" before its decimals; if this is '
                     f'one, write decimal = "{decimal}"{group} under [file] of the map'
                 )
+    apart = next((one for one in (";", "\t", "|", ",") if one in cell), "")
+    if apart and apart != layout.delimiter:
+        name = "tab" if apart == "\t" else apart
+        comma = ' and decimal = ","' if apart == ";" and layout.delimiter == "," else ""
+        return (
+            f'Expected a number; "{apart}" stands between the cells, it seems: write delimiter = '
+            f'"{name}"{comma} under [file] of the map'
+        )
+    if not layout.header and re.fullmatch(r"[A-Za-z][\w .\[\]()/]*", cell):
+        return (
+            "Expected a number; if this is a line of names, write header = true under [file] of "
+            "the map and name the columns by them, or skip = 1"
+        )
     return "Expected a number, or nothing; what says that there is nothing stands under missing"
 
 

@@ -38,6 +38,8 @@ class Row:
     kind: str = "point"
     instrument: str = ""
     cells: Mapping[str, float] | None = None
+    nest2: str = ""
+    plane: str = ""
 
 
 def told_by_pose(

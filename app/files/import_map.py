@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 from app.files.foreign_table import Column, Layout, layout_of
 from app.files.import_columns import Numbers, Text, columns_of, numbers_of, text_of
+from app.files.time_forms import FORMS
 from calib.runs.header import Header, contents_of
 from calib.runs.sensing import Setup
 from calib.runs.setup import setup_of
@@ -17,7 +18,6 @@ from calib.toml_table import TomlTable
 from calib.units import Unit, unit_named
 
 FORMAT = "pkm-import/1"
-FORMS = ("s", "iso", "clock")
 """What times may be, besides a pattern of strptime."""
 TABLES = (
     "format", "machine", "title", "tracker", "nests", "controller", "load", "file", "time", "pose",
@@ -25,7 +25,9 @@ TABLES = (
     "sigma", "channels", "commands",
 )  # fmt: skip
 """What a map may hold: what a run.toml has, and where the columns come from."""
-KINDS = ("xyz", "spherical", "angles", "pose")
+NUMBERS = {"height": "mm", "direction": "mm", "distance": "mm", "tilt": "rad"}
+"""Kinds of which a column holds one number, with its unit."""
+KINDS = ("xyz", "spherical", "angles", "pose", *NUMBERS)
 VERTICAL = ("elevation", "zenith")
 HORIZONTAL = ("counter-clockwise", "clockwise")
 ROTATIONS = ("quaternion wxyz", "quaternion xyzw", "rotation vector")
@@ -54,6 +56,10 @@ class Reading:
     instrument: str = ""
     pose: Commanded | None = None
     """Of a measured pose: where its numbers stand."""
+    nest2: str = ""
+    """The other end of a distance."""
+    plane: str = ""
+    """What a direction touches."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +132,7 @@ class ImportMap:
     @property
     def of_kinds(self) -> bool:
         """Whether there are readings that version 1 of a run does not know."""
-        return any(reading.kind in ("angles", "pose") for reading in self.readings)
+        return any(reading.kind not in ("xyz", "spherical") for reading in self.readings)
 
 
 def parse_map(text: str, source: str) -> ImportMap:
@@ -249,6 +255,8 @@ def _readings(top: TomlTable) -> list[Reading]:
         instrument = table.text("instrument", "")
         if kind == "xyz":
             read = Reading(kind, numbers_of(table, 3, ("mm",)), nest)
+        elif kind in NUMBERS:
+            read = _one_number(table, kind, nest)
         elif kind == "pose":
             pose = _pose(table)
             read = Reading(kind, pose.place_numbers, nest, pose=pose)
@@ -268,6 +276,16 @@ def _readings(top: TomlTable) -> list[Reading]:
     return found
 
 
+def _one_number(table: TomlTable, kind: str, nest: str) -> Reading:
+    nest2, plane = table.text("nest2", ""), table.text("plane", "")
+    if nest2 and kind != "distance":
+        raise table.wrong(f"a {kind} has no other end", "nest2", remedy="Leave nest2 out")
+    if plane and kind != "direction":
+        raise table.wrong(f"a {kind} touches no plane", "plane", remedy="Leave plane out")
+    numbers = numbers_of(table, 1, (NUMBERS[kind],))
+    return Reading(kind, numbers, nest, nest2=nest2, plane=plane)
+
+
 def _spherical(table: TomlTable, kind: str, nest: str) -> Reading:
     distance = None
     if kind == "spherical" and table.has("distance"):
@@ -285,10 +303,27 @@ def _spherical(table: TomlTable, kind: str, nest: str) -> Reading:
     )
 
 
+def _sigma_of_number(table: TomlTable, unit: str, coverage: float) -> Sigma:
+    """A column, or one for all."""
+    if table.has("columns"):
+        found = Sigma(numbers_of(table, 1, (unit,)), coverage, place=table.place())
+    else:
+        found = Sigma(None, coverage, table.quantity("value", unit, 0.0), place=table.place())
+        if not found.value or found.value < 0.0:
+            raise table.wrong(
+                "nothing says how uncertain a number is", "value",
+                remedy='Write columns = ["sigma"] with a unit, or value = "5 um" ("0.01 deg")',
+            )  # fmt: skip
+    table.end()
+    return found
+
+
 def _sigma(table: TomlTable, kind: str) -> Sigma:
     """What a reading's uncertainty is; raises BadInput where nothing states it."""
     coverage = table.number("coverage", 1.0, above=0.0)
     place = table.place()
+    if kind in NUMBERS:
+        return _sigma_of_number(table, NUMBERS[kind], coverage)
     if kind == "pose":
         value = table.quantity("place", "mm", 0.0, least=0.0)
         turn = table.quantity("turn", "rad", 0.0, least=0.0)
@@ -357,7 +392,7 @@ def _time(table: TomlTable) -> Time:
     if form not in FORMS and "%" not in form:
         raise table.wrong(
             f"form is {form!r}", "form",
-            remedy='Write "s", "iso", "clock" (12:34:56), or a pattern: "%d.%m.%Y %H:%M"',
+            remedy='Write "s", "iso", "clock" (12:34:56), "excel", or a pattern: "%d.%m.%Y %H:%M"',
         )  # fmt: skip
     unit = table.text("unit", "")
     found = unit_named(unit, table.place("unit"), "s") if unit else None

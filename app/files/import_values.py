@@ -10,6 +10,7 @@ import numpy as np
 from app.files.foreign_table import ForeignTable
 from app.files.import_columns import Numbers, Text
 from app.files.import_map import Reading, Sigma, Time
+from app.files.time_forms import are_days, form_of
 from calib.arrays import Array
 from calib.errors import BadInput
 from calib.units import Unit, unit_named
@@ -113,17 +114,26 @@ def times(reader: Reader, wanted: Time) -> tuple[list[float | datetime], str]:
     """
     table = reader.table
     columns = [reader.at(column, wanted.place) for column in wanted.columns]
-    if wanted.form == "s":
-        at = columns[0]
+    if wanted.form in ("s", "excel"):
+        at, days = columns[0], wanted.form == "excel"
         stated = table.units[at]
         unit = wanted.unit or unit_named(stated or "s", table.source, "s")
-        values = [unit.convert(table.number(row, at)) for row in range(len(table.rows))]
+        found_at = [_number_of_time(table, row, at) for row in range(len(table.rows))]
+        if not (days or wanted.unit or stated) and are_days(found_at):
+            raise BadInput(
+                f"found {table.text(0, at)!r}: these are Excel's dates, days since 1900, not s",
+                place=table.place(0, at),
+                remedy='Write form = "excel" under [time] of the map (or unit = "s")',
+            )
+        values = [DAY_S * one if days else unit.convert(one) for one in found_at]
         for row, value in enumerate(values):
             if not math.isfinite(value):
                 raise BadInput(
                     "the field is empty", place=table.place(row, at), remedy="Add a time"
                 )
-        said = "" if wanted.unit or stated else "times are in s: neither map nor file says it"
+        said = (
+            "" if days or wanted.unit or stated else "times are in s: neither map nor file says it"
+        )
         return list(values), said
     texts = [
         " ".join(table.text(row, at) for at in columns).strip() for row in range(len(table.rows))
@@ -142,6 +152,19 @@ def times(reader: Reader, wanted: Time) -> tuple[list[float | datetime], str]:
     return list(found), "" if True in zoned else "times state no zone: all are of one"
 
 
+def _number_of_time(table: ForeignTable, row: int, at: int) -> float:
+    """A number; raises BadInput that names the form where it is a date or a time of day."""
+    try:
+        return table.number(row, at)
+    except BadInput as error:
+        form = form_of([table.text(row, at)])
+        if form is None:
+            raise
+        raise BadInput(
+            error.what, place=error.place, remedy=f'Write form = "{form}" under [time] of the map'
+        ) from None
+
+
 def _moment(text: str, form: str, place: str) -> datetime:
     try:
         if form == "iso":
@@ -149,6 +172,8 @@ def _moment(text: str, form: str, place: str) -> datetime:
         return datetime.strptime(text, form)
     except ValueError:
         wanted = "ISO 8601, as 2024-05-31T14:05:06.5" if form == "iso" else f"a time as {form}"
+        other = form_of([text])
+        wanted += f'; or write form = "{other}" under [time] of the map' if other else ""
         raise BadInput(f"found {text!r}", place=place, remedy=f"Expected {wanted}") from None
 
 
@@ -223,6 +248,24 @@ def angles(reader: Reader, reading: Reading, sigma: Sigma) -> dict[str, Array]:
     spread = np.full(values.shape[1], sigma.angle / sigma.coverage)
     wide = spread / np.maximum(np.cos(rise), 1e-6) if sigma.sky else spread
     return {"azimuth": turn, "elevation": rise, "sazimuth": wide, "selevation": spread}
+
+
+def one_number(reader: Reader, reading: Reading, sigma: Sigma) -> dict[str, Array]:
+    """Columns (N,) of a reading of one number, mm or rad; nan where the row holds none."""
+    value = reader.numbers(reading.numbers)[0]
+    spread = np.full(value.size, sigma.value or np.nan)
+    if sigma.numbers is not None:
+        spread = np.abs(reader.numbers(sigma.numbers)[0])
+        reader_row = np.flatnonzero(np.isfinite(value) & ~(spread > 0.0))
+        if reader_row.size:
+            row = int(reader_row[0])
+            raise BadInput(
+                f"the uncertainty of this number is {spread[row]:g}",
+                place=f"{reader.table.source}, line {reader.table.lines[row]}",
+                remedy="Write a number larger than zero",
+            )
+    names = ("z", "sz") if reading.kind == "height" else ("value", "sigma")
+    return dict(zip(names, (value, spread / sigma.coverage), strict=True))
 
 
 def _outer(v: Array) -> Array:

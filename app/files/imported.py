@@ -17,7 +17,14 @@ from app.files.import_commands import (
     with_commands,
 )
 from app.files.import_map import ImportMap, Reading
-from app.files.import_values import Reader, angles, positions, seconds_from_start, times
+from app.files.import_values import (
+    Reader,
+    angles,
+    one_number,
+    positions,
+    seconds_from_start,
+    times,
+)
 from app.files.imported_kinds import points_text
 from calib.arrays import Array
 from calib.errors import BadInput
@@ -157,6 +164,8 @@ class _Rows:
                             covariance=part.covariance,
                             cells=part.cells,
                             kind=part.kind,
+                            nest2=part.nest2,
+                            plane=part.plane,
                             instrument=reading.instrument,
                         )
                     )
@@ -191,14 +200,16 @@ class _Rows:
                 else None
                 for row in range(count)
             ]
-        columns = (
-            angles(self.reader, reading, self.plan.sigma)
-            if reading.kind == "angles"
-            else self._pose_cells(reading)
-        )
+        if reading.kind == "angles":
+            columns = angles(self.reader, reading, self.plan.sigma)
+        elif reading.kind == "pose":
+            columns = self._pose_cells(reading)
+        else:
+            columns = one_number(self.reader, reading, self.plan.sigma)
+        kind = "point" if reading.kind == "height" else reading.kind
         cells = [{name: float(v[row]) for name, v in columns.items()} for row in range(count)]
         return [
-            replace(_NOTHING, cells=one, kind=reading.kind)
+            replace(_NOTHING, cells=one, kind=kind, nest2=reading.nest2, plane=reading.plane)
             if all(map(math.isfinite, one.values()))
             else None
             for one in cells

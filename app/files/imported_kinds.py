@@ -14,6 +14,8 @@ from calib.runs.header import OF_KINDS
 
 KEYS = ("title", "tracker", "nests", "controller", "load", "instruments", "planes")
 """Tables of run.toml that a header hands on as they stand."""
+ENDS = ("nest2", "plane")
+"""What readings of one number may refer to."""
 _PAIRS = {"sxy": (0, 1), "sxz": (0, 2), "syz": (1, 2)}
 
 
@@ -30,7 +32,8 @@ def points_text(rows: Sequence[Row], time_s: Array, channels: Sequence[str]) -> 
     count = rows[0].q.size
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    fixed = ["time_s", "pose", "kind", "instrument", "nest"]
+    ends = [name for name in ENDS if any(getattr(row, name) for row in rows)]
+    fixed = ["time_s", "pose", "kind", "instrument", "nest", *ends]
     writer.writerow([*fixed, *(f"q{k + 1}" for k in range(count)), *names, *channels])
     for row, own, time in zip(rows, cells, time_s.tolist(), strict=True):
         kind = row.kind if row.nest else ""
@@ -38,6 +41,7 @@ def points_text(rows: Sequence[Row], time_s: Array, channels: Sequence[str]) -> 
         writer.writerow(
             [
                 *(repr(time), row.pose, kind, instrument, row.nest),
+                *(getattr(row, name) if row.nest else "" for name in ends),
                 *(repr(value) for value in np.round(row.q, 12).tolist()),
                 *(repr(own[name]) if name in own else "" for name in names),
                 *(_channel(row.channels[name]) for name in channels),

@@ -12,16 +12,19 @@ from app.files.foreign_table import ForeignTable, parse_number
 from app.files.guessed_layout import guessed_table
 from app.files.import_map import FORMAT
 from app.files.machines import load_machine
+from app.files.time_forms import are_days, either_way, form_of
 from app.jobs.chosen_runs import File, Runs, names_of
 from app.jobs.record import Report
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 
 SHOWN = 3
+LOOKED_AT = 200
+"""Rows by which the form of times is guessed."""
 _NAMES = {
-    "time": r"time|zeit|date.?time|timestamp|date",
-    "pose": r"pose|target|point|config|label|name|id",
-    "nest": r"nest|smr|reflector|marker|probe|prism",
+    "time": r"time|zeit|date.?time|timestamp|date|datum|uhrzeit",
+    "pose": r"pose|target|point|config|label|name|punkt|stellung|position.?id|id",
+    "nest": r"nest|smr|reflector|marker|probe|prism|kugel|reflektor|ball|target.?id",
     "station": r"station|instrument",
 }
 _ACTUATOR = r"(?i)(?:q|j|joint|axis|a|theta|leg|motor|limb)[ _]?\[?(\d+)\]?(?:[ _]?(?:deg|rad|mm))?"
@@ -136,6 +139,10 @@ class _Guess:
 
     def _file(self) -> str:
         layout = self.table.layout
+        if shipped := self._shipped():
+            self.missing.append(
+                f"or use the map that ships: pkmcal import FILE --map {shipped} --commands FILE"
+            )
         self.assumed.append(
             f'[file] {layout.encoding}, "{layout.delimiter}" between columns, '
             f'"{layout.decimal}" before decimals, {layout.skip} lines before the table, '
@@ -155,20 +162,55 @@ class _Guess:
         ]
         return "\n".join(lines)
 
+    def _shipped(self) -> str:
+        """Which shipped map reads a table of this shape: names, then three numbers."""
+        table = self.table
+        numeric = [self._numeric(at) for at in range(table.width)]
+        cell = table.rows[0][0]
+        if table.layout.header or table.layout.decimal != ".":
+            return ""
+        if len(numeric) == 6 and not (numeric[0] or numeric[2]) and all(numeric[3:]):
+            return "spatial-analyzer"
+        return "polyworks" if numeric == [False] + [True] * 3 and "_" in cell else ""
+
     def _time(self) -> str:
         at = self._find("time")
         if at is None:
             self.assumed.append("[time] no column of times was found: rows are 10 s apart")
             return "[time]  # ASSUMED: no column of times was found\nstep_s = 10.0\n"
-        cell = self.table.rows[0][at].strip()
-        number = parse_number(cell, self.table.layout) is not None
-        form = "s" if number else "clock" if re.match(r"\d{1,2}:\d{2}", cell) else "iso"
-        self.assumed.append(f'[time] column "{self.table.column_name(at)}" holds "{form}"')
-        unit = '\nunit = "s"  # ASSUMED' if number and not self.table.units[at] else ""
+        columns, form = [at], self._form([at])
+        if form is None and (other := self._find("time")) is not None:
+            columns.append(other)  # a column of dates, and one of times of the day
+            form = self._form(columns)
+        form = form or "iso"
+        names = '" and "'.join(map(self.table.column_name, columns))
+        either = either_way(form, self._times(columns))
+        doubt = "; day and month may be exchanged" if either else ""
+        self.assumed.append(f'[time] column "{names}" holds "{form}"{doubt}')
+        unit = '\nunit = "s"  # ASSUMED' if form == "s" and not self.table.units[at] else ""
+        column = ", ".join(map(self._name, columns))
         return (
-            f"[time]  # ASSUMED\ncolumn = {self._name(at)}\n"
-            f'form = "{form}"  # "s", "iso", "clock", or a pattern: "%d.%m.%Y %H:%M:%S"{unit}\n'
+            f"[time]  # ASSUMED{doubt}\ncolumn = {f'[{column}]' if len(columns) > 1 else column}\n"
+            f'form = "{form}"  # "s", "iso", "clock", "excel", or a pattern: "%d.%m.%Y %H:%M:%S"'
+            f"{unit}\n"
         )
+
+    def _times(self, columns: Sequence[int]) -> list[str]:
+        rows = self.table.rows[:LOOKED_AT]
+        return [" ".join(row[at].strip() for at in columns) for row in rows]
+
+    def _form(self, columns: Sequence[int]) -> str | None:
+        """The form of times; None if these columns hold none, or dates alone."""
+        texts = self._times(columns)
+        if len(columns) == 1:
+            values = [parse_number(text, self.table.layout) for text in texts]
+            numbers = [one for one in values if one is not None]
+            if len(numbers) == len(texts):
+                stated = self.table.units[columns[0]]
+                return "excel" if not stated and are_days(numbers) else "s"
+            if all(len(text) <= 10 for text in texts) and form_of(texts) in (None, "iso"):
+                return None
+        return form_of(texts)
 
     def _label(self, key: str, otherwise: str) -> str:
         at = self._find(key)

@@ -90,6 +90,17 @@ horizontal = "clockwise"
 [sigma]
 angle = "1 deg"
 """,
+    BEGIN.format(time="step_s = 1.0")
+    + """
+[actuators]
+columns = 1
+[[reading]]
+kind = "distance"
+columns = [1]
+nest2 = "b1"
+[sigma]
+value = "1 mm"
+""",
 )
 SHARED = (
     r"(instruments|planes)\..*|(?!actuators).*\.(unit|sign|gear|scale|offset)|"
