@@ -204,6 +204,9 @@ class Session:
         halted = asyncio.create_task(self.station.safe_stop())
         if self._driving is not None:
             self._driving.cancel()
+        await asyncio.sleep(0)  # the stop is on its way before anything is written
+        with contextlib.suppress(sqlite3.Error):
+            self.work.note("stop", "asked for by the operator")
         await halted
 
     def answer_prompt(self, prompt: str, choice: str) -> None:

@@ -135,6 +135,8 @@ def test_measuring_goes_on_and_a_stop_is_heard_while_nobody_reads(
     assert terminal.unread == full
     terminal.press("\x18")
     wait(lambda: any(kind == "stopped" for _, kind, _ in with_journal.notes()))
+    kinds = [kind for _, kind, _ in with_journal.notes()]
+    assert kinds.index("stop") < kinds.index("stopped")
     assert terminal.unread == full
     with_journal.close()
 
