@@ -16,6 +16,7 @@ from app.files.fits import MODEL_FORMAT, read_fit, region_table
 from app.files.machines import shipped_machines
 from app.files.staircase import Way, way_tables
 from app.files.text import read_text
+from app.surely import write_surely
 from calib.command import Region
 from calib.effects import Effect, effect_named, is_shipped
 from calib.errors import BadInput
@@ -112,7 +113,7 @@ def write_model(path: Path, fit: Fit, way: Way = Way()) -> None:  # noqa: B008 -
             for index, (name, row) in enumerate(zip(fit.model.names, correlation, strict=True))
         },
     }
-    path.write_text(tomli_w.dumps(table), encoding="utf-8")
+    write_surely(path, tomli_w.dumps(table))
 
 
 def _machine_file(machine: Machine, model: Path) -> str:

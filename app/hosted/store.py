@@ -8,7 +8,6 @@ refused, not computed with.
 
 import hashlib
 import json
-import os
 import re
 from collections.abc import Mapping
 from datetime import UTC, datetime
@@ -18,6 +17,7 @@ from typing import Any
 from app.files.text import read_text
 from app.hosted.parameters import DEVICE, ParameterSet
 from app.ownership import Ownership, state_folder
+from app.surely import write_surely
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from drivers.errors import DeviceError, ParameterError, Refused
@@ -112,7 +112,7 @@ class HostStore:
         }
         text = json.dumps({**said, "sha256": _digest(said)}, indent=1, ensure_ascii=False)
         try:
-            _write_surely(self.path(number), text)
+            write_surely(self.path(number), text, private=True)
         except OSError as error:
             raise DeviceError(
                 f"the set cannot be written: {error}",
@@ -145,19 +145,3 @@ def usual_folder(machine: Machine, identity: Identity) -> Path:
 def _digest(said: Mapping[str, Any]) -> str:
     """SHA-256 over everything that a set says, whatever the blanks between."""
     return hashlib.sha256(json.dumps(said, sort_keys=True).encode("utf-8")).hexdigest()
-
-
-def _write_surely(path: Path, text: str) -> None:
-    """Write a new file so that it is whole or absent, whatever happens."""
-    draft = path.with_suffix(".draft")
-    with draft.open("w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    draft.replace(path)
-    if os.name == "posix":  # elsewhere a folder cannot be flushed
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)

@@ -7,7 +7,6 @@ machine that has never been changed is expected to hold the machine file's nomin
 
 import json
 import math
-import os
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -18,6 +17,7 @@ from app.files.site import Site
 from app.files.text import read_text
 from app.hosted.controller import HostedController
 from app.ownership import state_folder
+from app.surely import write_surely
 from calib.errors import BadInput
 from drivers.errors import ParameterError
 from drivers.interface import Identity, MotionController
@@ -105,7 +105,7 @@ class Snapshots:
             dict(held.values),
             dict(held.own),
         )
-        _write_surely(self.path(snapshot), snapshot.to_json())
+        write_surely(self.path(snapshot), snapshot.to_json(), private=True)
         return snapshot
 
     def get(self, number: int) -> Snapshot:
@@ -124,7 +124,7 @@ class Snapshots:
     def expect(self, held: Held) -> None:
         """Remember what was left in the controller; clears the latch."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        _write_surely(self.folder / "expected.json", json.dumps(asdict(held)))
+        write_surely(self.folder / "expected.json", json.dumps(asdict(held)), private=True)
         (self.folder / "unknown").unlink(missing_ok=True)
 
     def expected(self) -> Held | None:
@@ -139,22 +139,12 @@ class Snapshots:
     def latch_unknown(self, why: str) -> None:
         """Remember that nobody knows what the controller holds; blocks motion until undone."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        _write_surely(self.folder / "unknown", why)
+        write_surely(self.folder / "unknown", why, private=True)
 
     def unknown(self) -> str:
         """Why the parameters are unknown; empty if they are not."""
         path = self.folder / "unknown"
         return read_text(path) if path.is_file() else ""
-
-
-def _write_surely(path: Path, text: str) -> None:
-    """Write a file so that it is whole or absent, whatever happens."""
-    draft = path.with_suffix(".draft")
-    with draft.open("w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    draft.replace(path)
 
 
 async def read_held(site: Site, controller: MotionController) -> Held:

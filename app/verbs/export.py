@@ -9,6 +9,7 @@ import click
 
 from app import answer
 from app.defaults import PLAIN, TEMPLATES
+from app.surely import write_surely
 from calib.errors import BadInput
 
 
@@ -38,5 +39,5 @@ def command(model: Path, form: str, machine: str | None, out: Path | None, force
         return
     if out.exists() and not force:
         raise BadInput("there is such a file already", place=str(out), remedy="Add --force.")
-    out.write_text(text, encoding="utf-8")
+    write_surely(out, text)
     answer.say(f"written to {out}")
