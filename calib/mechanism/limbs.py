@@ -12,6 +12,7 @@ from calib.mechanism.chain_value import Meant
 from calib.mechanism.description import Actuator, Limb, Parameter, Term
 from calib.mechanism.trait_reader import TraitReader
 from calib.quantity import measured
+from calib.toml_faults import Faults
 from calib.toml_table import TomlTable
 
 _TYPE_KEYS = ("chain", "chains", "parameters", "joints", "traits", "says")
@@ -25,6 +26,8 @@ class LimbReader:
 
     top: TomlTable
     """The whole machine file."""
+    faults: Faults
+    """What is wrong with it; what can be read behind a fault is read."""
     parameters: list[Parameter] = field(default_factory=list)
     index: dict[str, int] = field(default_factory=dict)
     actuators: list[Actuator] = field(default_factory=list)
@@ -32,9 +35,21 @@ class LimbReader:
     chain_names: list[ChainNames] = field(default_factory=list)
     """Names in the chain of every limb."""
     traits_stated: bool = False
+    told: set[tuple[str, str]] = field(default_factory=set)
+    """Faults of limbs that were told: where, and what but for the limb's name."""
 
     def add_parameter(self, name: str, about: TomlTable, at: TomlTable, key: str) -> None:
-        """Add a parameter that ``about`` describes; its nominal value is ``key`` of ``at``."""
+        """Add a parameter that ``about`` describes; its nominal value is ``key`` of ``at``.
+
+        One that cannot be read stands there all the same: what names it is no fault.
+        """
+        unit = "rad" if about.raw("unit") == "rad" else "mm"
+        stands_in = Parameter(name, 0.0, unit, 1.0, 1.0, "", False)
+        read = self.faults.attempt(lambda: self._parameter_of(name, about, at, key)) or stands_in
+        self.index.setdefault(name, len(self.parameters))
+        self.parameters.append(read)
+
+    def _parameter_of(self, name: str, about: TomlTable, at: TomlTable, key: str) -> Parameter:
         about.only(*_PARAMETER_KEYS)
         unit = unit_of(about, "A parameter is in mm or rad.")
         if not at.has(key):
@@ -51,18 +66,29 @@ class LimbReader:
             )
         if name in self.index:
             raise about.wrong(f'parameter "{name}" is described twice', remedy="Keep one of them.")
-        self.index[name] = len(self.parameters)
-        self.parameters.append(
-            Parameter(
-                name,
-                nominal,
-                unit,
-                tolerance or float(sigma * np.sqrt(3.0)),
-                sigma,
-                about.text("says", ""),
-                about.flag("hidden", False),
-            )
+        return Parameter(
+            name,
+            nominal,
+            unit,
+            tolerance or float(sigma * np.sqrt(3.0)),
+            sigma,
+            about.text("says", ""),
+            about.flag("hidden", False),
         )
+
+    def attempted_limb(self, name: str, own: TomlTable) -> list[Limb]:
+        """A limb as :meth:`limb` reads it; none where it cannot be read.
+
+        A fault of a type's chain is told once, not for each limb of the type.
+        """
+        try:
+            return self.limb(name, own)
+        except BadInput as fault:
+            where, what = fault.place.split(", limb ")[0], fault.what.replace(name, "")
+            if (where, what) not in self.told:
+                self.told.add((where, what))
+                self.faults.add(fault)
+            return []
 
     def limb(self, name: str, own: TomlTable) -> list[Limb]:
         """A limb, or the several that go by one name (the rods of a parallelogram)."""

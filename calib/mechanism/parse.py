@@ -11,6 +11,7 @@ from calib.mechanism.description import (
 from calib.mechanism.hidden import with_hidden_apart
 from calib.mechanism.limbs import LimbReader, unit_of
 from calib.mechanism.traits_by_name import traits_by_name
+from calib.toml_faults import Faults
 from calib.toml_table import TomlTable
 
 FORMAT = "pkm-machine/1"
@@ -38,9 +39,10 @@ def parse_machine(text: str, source: str) -> Machine:
     Raises
     ------
     BadInput
-        Naming the file, the line, what was found and the remedy.
+        Naming the file, the line, what was found and the remedy; with several faults that can be
+        told apart each of them (:class:`calib.toml_faults.ManyFaults`).
     """
-    return _Reader(TomlTable.parse(text, source)).machine(source)
+    return _Reader(TomlTable.parse(text, source), Faults(source)).machine(source)
 
 
 def _unit_of(name: str) -> str:
@@ -50,13 +52,12 @@ def _unit_of(name: str) -> str:
 class _Reader(LimbReader):
     def machine(self, source: str) -> Machine:
         top = self.top
+        attempt = self.faults.attempt
         top.format(FORMAT)
-        top.only(*_TOP)
-        name = top.text("name", "")
-        if not name:
-            raise top.wrong("the machine has no name", remedy='Write name = "my-machine".')
+        name = attempt(self.name)
         actuators = top.named("actuators", required=False)
-        self.actuators += [_actuator(key, actuators.table(key)) for key in actuators]
+        for key in actuators:
+            self.add_actuator(key, actuators.table(key))
         if not self.actuators:
             raise top.wrong("no actuator is described", remedy="Add a table [actuators].")
         parameters = top.named("parameters", required=False)
@@ -65,13 +66,15 @@ class _Reader(LimbReader):
         limb_tables = top.named("limbs", required=False)
         if not limb_tables.names():
             raise top.wrong("no limb is described", remedy="Add tables [limbs.NAME].")
-        limbs = tuple(
-            limb for key in limb_tables for limb in self.limb(key, limb_tables.table(key))
-        )
+        found: list[Limb] = []
+        for key in limb_tables:
+            found += self.attempted_limb(key, limb_tables.table(key))
+        home, task, workspace = attempt(self.home), attempt(self.task), attempt(self.workspace)
+        self.faults.end()
+        limbs = tuple(found)
         self.check_references(limbs)
         if not self.traits_stated:
             limbs = traits_by_name(limbs, self.chain_names, self.parameters, self.actuators)
-        home = self.home()
         machine = Machine(
             name=name,
             says=top.text("says", ""),
@@ -79,14 +82,27 @@ class _Reader(LimbReader):
             limbs=limbs,
             parameters=tuple(self.parameters),
             actuators=tuple(self.actuators),
-            task=self.task(),
+            task=task,
             home=home,
-            workspace=self.workspace(),
+            workspace=workspace,
             size=self.size(limbs, home),
             extra={key: top.raw(key) for key in _KEPT if top.has(key)},
             traits_stated=self.traits_stated,
         )
         return with_hidden_apart(machine)
+
+    def name(self) -> str:
+        self.top.only(*_TOP)  # a key that is misspelt may be the name
+        name = self.top.text("name", "")
+        if not name:
+            raise self.top.wrong("the machine has no name", remedy='Write name = "my-machine".')
+        return name
+
+    def add_actuator(self, name: str, table: TomlTable) -> None:
+        """Add an actuator; one that cannot be read stands there all the same, known by name."""
+        read = self.faults.attempt(lambda: _actuator(name, table))
+        unit = "rad" if table.raw("unit") == "rad" else "mm"
+        self.actuators.append(read or Actuator(name, unit, 0.0, (-1.0, 1.0), 0.0, 0.0))
 
     def check_references(self, limbs: tuple[Limb, ...]) -> None:
         driven: dict[int, list[str]] = {}

@@ -8,15 +8,17 @@ import pytest
 
 from calib.errors import BadInput
 from calib.mechanism.parse import parse_machine
+from calib.toml_faults import ManyFaults
 
 TEXT = files("calib.machines").joinpath("hexapod.toml").read_text()
 
 
 def fault(old: str, new: str) -> BadInput:
+    """What is told first of a spoilt file."""
     assert old in TEXT
     with pytest.raises(BadInput) as caught:
         parse_machine(TEXT.replace(old, new, 1), "mine.toml")
-    return caught.value
+    return caught.value.faults[0] if isinstance(caught.value, ManyFaults) else caught.value
 
 
 def line_with(text: str, part: str) -> int:
@@ -104,3 +106,26 @@ def test_reference_is_what_the_controller_holds() -> None:
     assert nominal[:, 0] == pytest.approx(np.full(6, 0.285))
     assert held[1, 0] == pytest.approx(0.1)
     assert held[0, 0] == pytest.approx(0.285)
+
+
+def test_every_fault_of_a_machine_file_is_told_at_once() -> None:
+    text = files("calib.machines").joinpath("stewart.toml").read_text("utf-8")
+    spoilt = {
+        'x = [-60.0, 60.0]': 'x = [60.0, -60.0]',
+        'q2 = { unit = "mm", reference = "leg2.L0", home = 394.230682':
+            'q2 = { unit = "mm", reference = "leg2.L0", home = 94.230682',
+        'B_y = { unit = "mm", tolerance = 0.2': 'B_y = { unit = "mm", tolerance = 0.0',
+        'screw = "turn"': 'screw = "tern"',
+        'q = "q5"': 'q = "q9"',
+    }  # fmt: skip
+    for right, wrong in spoilt.items():
+        assert text.count(right) == 1
+        text = text.replace(right, wrong)
+    lines = [line_with(text, wrong) for wrong in spoilt.values()]
+    with pytest.raises(ManyFaults) as told:
+        parse_machine(text, "spoilt.toml")
+    assert len(lines) == len(spoilt)
+    assert [int(re.findall(r"line (\d+)", one.place)[0]) for one in told.value.faults] == sorted(
+        lines
+    )
+    assert "5 faults" in str(told.value)
