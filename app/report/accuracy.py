@@ -74,24 +74,41 @@ def result_blocks(
         return (Text(said),)
     named = LEFT if after else FOUND
     blocks: list[Block] = [*_verdict(last, named, tolerance), summary_table(before, after)]
+    if tolerance.um is None and tolerance.mdeg is None:
+        blocks.append(Text("No tolerance was agreed: conformity is not judged."))
+    elif before is not None and after is not None:
+        blocks += [Text(said) for said in _as_found(before, tolerance)]
     return tuple(blocks)
+
+
+def _as_found(before: Checked, tolerance: Tolerance) -> list[str]:
+    """What the machine was before anything was changed: it concerns all that was made with it."""
+    judged = judge_tolerance(before, tolerance)
+    if not judged:
+        return []
+    passed = all(one.passed for one in judged)
+    told = "; ".join(_told(one) for one in judged)
+    return [f"As found, by the same rule: {'PASS' if passed else 'FAIL'}. {told}."]
 
 
 def _verdict(last: Checked, named: str, tolerance: Tolerance) -> list[Block]:
     judged = judge_tolerance(last, tolerance)
     if not judged:
         return []
-    said = []
-    for one in judged:
-        value, spread = with_uncertainty(one.largest, one.expanded)
-        state = "within" if one.passed else ("not shown to be within" if one.open else "beyond")
-        said.append(
-            f"{one.name.capitalize()}: {value} ± {spread} {one.unit} at the pose nearest to the "
-            f"limit, {state} {one.tolerance:g} {one.unit}."
-        )
+    said = "; ".join(_told(one) for one in judged)
     passed = all(one.passed for one in judged)
-    words = f"The machine {named}, at the {len(last.labels)} poses of the verification. "
-    return [Verdict("PASS" if passed else "FAIL", words + " ".join(said))]
+    words = f"The machine {named}, at the {len(last.labels)} poses of the verification. {said}."
+    return [Verdict("PASS" if passed else "FAIL", words)]
+
+
+def _told(one: Judged) -> str:
+    """A quantity at the pose that is nearest to its limit."""
+    value, spread = with_uncertainty(one.largest, one.expanded)
+    state = "within" if one.passed else ("not shown to be within" if one.open else "beyond")
+    return (
+        f"{one.name.capitalize()}: {value} ± {spread} {one.unit} at the pose nearest to the "
+        f"limit, {state} {one.tolerance:g} {one.unit}"
+    )
 
 
 def summary_table(before: Checked | None, after: Checked | None) -> Table:
@@ -156,7 +173,7 @@ def accuracy_section(
     ]
     blocks: list[Block] = [
         Text(
-            f"{len(last.labels)} poses that were not used in any fit ({box} mm, base frame). "
+            f"{_counts(before, after)} that were not used in any fit ({box} mm, base frame). "
             "Errors are wanted to measured, in the axes of the base frame; they hold the noise of "
             "the tracker."
         ),
@@ -177,6 +194,19 @@ def accuracy_section(
         )
     )
     return Section("Accuracy of the machine", tuple(blocks))
+
+
+def _counts(before: Checked | None, after: Checked | None) -> str:
+    """How many poses were visited: ``216 poses as found, 27 as left``."""
+    counts = [
+        (name, len(one.labels)) for name, one in ((FOUND, before), (LEFT, after)) if one is not None
+    ]
+    if len({count for _, count in counts}) == 1:
+        return f"{counts[0][1]} poses"
+    return ", ".join(
+        f"{count} poses {name}" if k == 0 else f"{count} {name}"
+        for k, (name, count) in enumerate(counts)
+    )
 
 
 def _axes_table(before: Checked | None, after: Checked | None) -> Table:

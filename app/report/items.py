@@ -70,17 +70,36 @@ def instruments_section(details: RecordDetails, sources: Sources, fit: Fit) -> S
                   f"{', '.join(header.base_nests) or 'none'}"),
     )  # fmt: skip
     blocks: list[Block] = [Facts(rows)]
+    blocks.append(Text(_traceability(details)))
     missing = [
         what
         for what, said in (
-            ("the tracker's own calibration", details.tracker_calibrated),
+            ("customer", details.customer.strip()),
+            ("laboratory", details.laboratory.strip()),
+            ("place", details.place.strip()),
+            ("operator", details.operator.strip()),
+            ("the machine's own serial number", details.machine_serial),
             ("the reflector's calibration", details.reflector_calibrated),
         )
         if not said
     ]
     if missing:
-        blocks.append(Text(f"Not stated by the laboratory: {' and '.join(missing)}."))
+        listed = ", ".join(missing[:-1]) + " and " * (len(missing) > 1) + missing[-1]
+        blocks.append(Text(f"Not stated by the laboratory: {listed}."))
     return Section("Item and instruments", tuple(blocks))
+
+
+def _traceability(details: RecordDetails) -> str:
+    """Whether lengths go back to the metre, and by which certificate."""
+    if details.tracker_calibrated and details.tracker_certificate:
+        return (
+            "Lengths are traceable to the metre by the calibration of the laser tracker, "
+            f"certificate {details.tracker_certificate}."
+        )
+    return (
+        "Metrological traceability is not shown: the laboratory states no certificate of the "
+        "laser tracker."
+    )
 
 
 def _device(identity: Mapping[str, str], serial: str, product: str = "") -> str:
