@@ -151,7 +151,7 @@ def begin_verifying(
         site, read_if_file(chosen, site), truth=truth, reference_every=reference_every
     )
     session = Session.create(site, plan, folder, station=station, unattended=unattended)
-    asked = {"before": before, "save": save}
+    asked = {"before": before, "save": save, "folder": session.folder}
     session.journal.set_meta(_ASKED, {k: str(p.resolve()) for k, p in asked.items() if p})
     return session
 
@@ -192,14 +192,19 @@ def _check(before: Path | None, save: Path | None) -> None:
 
 
 def _asked(folder: Path) -> tuple[Path | None, Path | None]:
-    """The earlier verification, and where the answer is to be kept."""
+    """The earlier verification, and where the answer is to be kept.
+
+    A session that was carried elsewhere keeps its answer in its own folder alone: what stands at
+    that path on this computer is somebody else's.
+    """
     journal = Journal(folder / JOURNAL, read_only=True)
     try:
         asked = journal.meta(_ASKED, {})
     finally:
         journal.close()
     before, save = (Path(asked[key]) if key in asked else None for key in ("before", "save"))
-    return before, save
+    at_home = asked.get("folder", str(folder.resolve())) == str(folder.resolve())
+    return before, save if at_home else None
 
 
 def verification_report(

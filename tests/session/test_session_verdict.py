@@ -69,6 +69,12 @@ def test_a_verification_that_was_stopped_ends_with_its_verdict(
     assert answer["before"]["measured"] == earlier
     for kept in (tmp_path / "s.json", session.folder / VERDICT):
         assert json.loads(kept.read_text(encoding="utf-8")) == answer
+    (tmp_path / "s.json").unlink()
+    elsewhere = session.folder.rename(tmp_path / "copied")
+    (elsewhere / VERDICT).unlink()
+    concluded(elsewhere)  # a session that was carried here writes nothing outside of its folder
+    assert (elsewhere / VERDICT).is_file()
+    assert not (tmp_path / "s.json").exists()
 
 
 @pytest.mark.parametrize(
