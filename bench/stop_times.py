@@ -36,7 +36,7 @@ from bench.terminal import CONNECT, NEW_RUN, STOP, Terminal, wait
 QUICK_STOP = re.compile(rb"t20[1-6]\d0200")
 SDO_ANSWER = re.compile(rb"t5[89][0-9A-F]{18}")
 PROMISED_S = 0.2
-FINDER, DISCOVER = b"\x10", b"4d"
+FINDER, DISCOVER, ESCAPE = b"\x10", b"4d", b"\x1b"
 
 
 class Tap:
@@ -118,9 +118,7 @@ def on_screens(lab: Lab, meanwhile: Callable[[Lab, Terminal], None]) -> float:
         time.sleep(1.0)
         terminal.press(CONNECT)
         wait(lambda: terminal.says("firmware"))
-        terminal.press(NEW_RUN)
-        time.sleep(1.0)
-        terminal.press(b"\r")
+        _begin(lab, terminal, known)
         lab.session(known).close()
         meanwhile(lab, terminal)
         lab.tap.stopped = 0.0
@@ -134,6 +132,21 @@ def on_screens(lab: Lab, meanwhile: Callable[[Lab, Terminal], None]) -> float:
             os.kill(terminal.pid, signal.SIGKILL)
         os.waitpid(terminal.pid, 0)
         os.close(terminal.fd)
+
+
+def _begin(lab: Lab, terminal: Terminal, known: set[Path]) -> None:
+    """Ask for a new run until one has begun: a busy computer draws its dialogs late."""
+    for _ in range(5):
+        terminal.press(NEW_RUN)
+        time.sleep(2.0)
+        terminal.press(b"\r")
+        until = time.monotonic() + 15.0
+        while time.monotonic() < until:
+            if lab.known() - known:
+                return
+            time.sleep(0.05)
+        terminal.press(ESCAPE)
+    raise TimeoutError("no run began")
 
 
 def without_screens(lab: Lab) -> float:

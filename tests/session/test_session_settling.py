@@ -1,6 +1,6 @@
 """When a machine stands: scatter and creep of the SMR, whatever the tracker's stream looks like."""
 
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from app.session.session import Session
 from app.session.station import Devices
 from app.session.work import Work
 from drivers.errors import NotReady
-from drivers.interface import TrackerCan, TrackSample
+from drivers.interface import TrackerCan, TrackerReading, TrackSample
 
 NOISE_MM = 0.003
 
@@ -100,3 +100,33 @@ async def test_creep_that_dies_away_is_waited_for(work: Work) -> None:
     await settle(seen_by(work, tracker))
     creep = 0.5 * window * a / tau * np.exp(-(tracker.last_s - 0.5 * window) / tau)
     assert 0.3 * limit < creep < limit + NOISE_MM
+
+
+class OneByOne:
+    """Without a continuous mode; every reading takes longer than settling may last."""
+
+    can = TrackerCan()
+
+    def __init__(self, work: Work, x: Sequence[float]) -> None:
+        self._work, self._x = work, iter(x)
+        self.readings = 0
+
+    async def measure(self, dwell_s: float) -> TrackerReading:
+        clock = self._work.clock
+        clock.start_at(clock.now() + self._work.limits.settle_timeout_s + 1.0)
+        self.readings += 1
+        variance = NOISE_MM**2
+        return TrackerReading((next(self._x), 0.0, 0.0), (variance,) * 3 + (0.0,) * 3)
+
+
+async def test_readings_that_take_long_are_compared_before_settling_is_given_up(work: Work) -> None:
+    tracker = OneByOne(work, [5.0, 0.0, 0.0])
+    work.station._devices = Devices(None, tracker)  # type: ignore[arg-type]
+    await settle(work)
+    assert tracker.readings == 3
+    work.memory.settled = False
+    tracker = OneByOne(work, [0.0, 5.0, 10.0, 15.0, 20.0])
+    work.station._devices = Devices(None, tracker)  # type: ignore[arg-type]
+    with pytest.raises(NotReady, match="do not agree"):
+        await settle(work)
+    assert tracker.readings == 4
