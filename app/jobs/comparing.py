@@ -83,12 +83,18 @@ class WorstPoseEntry(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class TermEntry(Record):
-    """A formula that would explain what is left; ``file`` where it is stable and was written."""
+    """A formula that would explain what is left.
+
+    ``held_out_um``: RMS over poses that the fit has not seen, with it, and without (``before``);
+    ``file`` where it is stable, predicts them better, and was written.
+    """
 
     formula: str
     explains_um: float
     log_evidence: float
     stability: float
+    held_out_um: float | None
+    held_out_before_um: float | None
     file: str | None
 
 
@@ -155,8 +161,8 @@ def compare(
     runs, add, model
         As for :func:`fit`.
     propose : path, optional
-        Look for terms that would explain what is left, and write the stable ones as effect files
-        (FILE, FILE-2 ...), which ``add`` takes.
+        Look for terms that would explain what is left, and write those that are stable and predict
+        unseen poses better as effect files (FILE, FILE-2 ...), which ``add`` takes.
     watch : callable, optional
         Told the effects of each model that is fitted.
 
@@ -187,13 +193,17 @@ def compare(
     return CompareReport.of(said, _found=found, _runs=names)
 
 
+def _in_um(rms_mm: float) -> float | None:
+    return 1000.0 * rms_mm if np.isfinite(rms_mm) else None
+
+
 def _propose(found: RunComparison, path: Path) -> list[dict[str, Any]]:
     """Write every stable term: FILE, FILE-2 ...; what was found, stable or not."""
     listed: list[dict[str, Any]] = []
     stable = 0
     for term in propose_terms(found.fit, np.random.default_rng(SEED)):
         file = None
-        if term.selected.stable:
+        if term.good:
             stable += 1
             name = path.name if stable == 1 else f"{path.stem}-{stable}{path.suffix}"
             file = path.with_name(name)
@@ -204,6 +214,8 @@ def _propose(found: RunComparison, path: Path) -> list[dict[str, Any]]:
                 "explains_um": 1000.0 * term.explains_mm,
                 "log_evidence": term.selected.log_evidence,
                 "stability": term.selected.frequency,
+                "held_out_um": _in_um(term.held_out_mm[1]),
+                "held_out_before_um": _in_um(term.held_out_mm[0]),
                 "file": None if file is None else str(file),
             }
         )

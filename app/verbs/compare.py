@@ -114,11 +114,21 @@ def _terms(proposed: list[dict[str, Any]]) -> list[str]:
             one["formula"],
             f"{one['explains_um']:.2f} um",
             f"{100 * one['stability']:.0f} %",
-            one["file"] or "not stable, not written",
+            _held_out(one),
+            one["file"] or "not written",
         )
         for one in proposed
     ]
-    return [text_table(("proposed term", "explains", "found in halves", "file"), rows)]
+    return [
+        text_table(("proposed term", "explains", "found in halves", "unseen poses", "file"), rows)
+    ]
+
+
+def _held_out(one: dict[str, Any]) -> str:
+    before, after = one["held_out_before_um"], one["held_out_um"]
+    if before is None or after is None:
+        return "cannot be fitted"
+    return f"{before:.2f} -> {after:.2f} um"
 
 
 def _repeats(what: str, repeats: dict[str, Any] | None) -> str:

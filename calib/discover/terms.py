@@ -1,5 +1,8 @@
 """A library of formulas for a run, and the proposal of an operator's effect from it.
 
+Beside shapes that are known from machines there are the products of any two states
+(:mod:`calib.discover.products`), the units of their coefficients derived.
+
 Every formula of the library is an effect file's (``calib.formulas.effect_file``), so that what is
 proposed can be saved, read and refined by hand. Variables are centred and scaled in the formulas
 themselves where that keeps numbers readable.
@@ -12,11 +15,15 @@ import numpy as np
 
 from calib.arrays import IntArray
 from calib.discover.problem import effect_candidates
+from calib.discover.products import actuator_products, point_products
+from calib.errors import BadInput
 from calib.evidence.terms import Selected, select_terms
 from calib.formulas.effect_file import effect_from_text
 from calib.formulas.formula_effect import OperatorEffect
 from calib.identify.fitting import Fit
+from calib.identify.holdout import hold_out
 from calib.identify.signatures import effect_columns
+from calib.identify.staged import fit_effects
 from calib.mechanism.axes import units_of
 
 PERIODS = 48
@@ -79,12 +86,21 @@ class ProposedTerm:
         Evidence and stability.
     explains_mm : float
         RMS over readings of what it explains.
+    held_out_mm : tuple of float
+        RMS over poses that the fit has not seen, without it and with it, fitted anew; nan where
+        the model with it cannot be fitted.
     """
 
     formula: str
     text: str
     selected: Selected
     explains_mm: float
+    held_out_mm: tuple[float, float]
+
+    @property
+    def good(self) -> bool:
+        """Whether most halves call for it, and poses that the fit has not seen are for it."""
+        return self.selected.stable and self.held_out_mm[1] < self.held_out_mm[0]
 
 
 def library(fit: Fit) -> list[Formula]:
@@ -100,6 +116,8 @@ def library(fit: Fit) -> list[Formula]:
     found += _points_of_time(fit)
     for text in ("range**2", "range**3", "elevation", "elevation**2", "sin(2*azimuth)"):
         found.append(Formula((f"{{a}} * {text}",), ("mm",), "point", True))
+    channels = [(name, _centred(name, low, high)) for name, low, high in varying]
+    found += [_along(one.text, one.unit) for one in point_products(channels)]
     waves = ("sin(azimuth)", "cos(azimuth)", "sin(2*azimuth)", "cos(2*azimuth)", "elevation**2")
     found += [_along(one, "mm") for one in waves]
     return found
@@ -128,6 +146,14 @@ def _of_actuators(
             for text in (f"{{a}} * {centre}", f"{{a}} * {centre} * s", f"{{a}} * {centre}**2")
             for shared in (True, False)
         ]
+    channels = [(name, _centred(name, low, high)) for name, low, high in varying]
+    known = {formula.text[0] for formula in found}
+    found += [
+        Formula((one.text,), (one.unit,), "actuator", shared)
+        for one in actuator_products(unit, channels, timed=_span(fit) is not None)
+        for shared in ((True, False) if one.own else (True,))
+        if one.text not in known
+    ]
     return [*found, *_of_time(fit, unit)]
 
 
@@ -201,7 +227,10 @@ def propose(fit: Fit, rng: np.random.Generator) -> list[ProposedTerm]:
     problem = fit.problem
     candidates = effect_candidates(fit, problem, effect_columns(fit, effects))
     found = select_terms(problem, candidates, _poses(fit), rng)
-    return [_proposal(fit, kept[one.index], number, one) for number, one in enumerate(found)]
+    before = hold_out(fit).rms_mm if found else float("nan")
+    return [
+        _proposal(fit, kept[one.index], number, one, before) for number, one in enumerate(found)
+    ]
 
 
 def _poses(fit: Fit) -> IntArray:
@@ -216,16 +245,32 @@ def _poses(fit: Fit) -> IntArray:
     return np.tile(one.astype(np.intp), 3)
 
 
-def _proposal(fit: Fit, formula: Formula, number: int, found: Selected) -> ProposedTerm:
+def _proposal(
+    fit: Fit, formula: Formula, number: int, found: Selected, before: float
+) -> ProposedTerm:
     moved = fit.model.rows.in_mm(found.fitted.reshape(3, -1), fit.accepted)
     said = ", ".join(one.format(a="a", b="b", c="c") for one in formula.text)
     says = f"proposed from the residual: {said}"
     if found.trial:
         name = formula.searched[0] if formula.searched else "x"
         said += f" with {name} near {found.trial[0]:.4g}"
+    text = formula.table(f"found-{number + 1}", says, "abc")
+    after = _held_out_with(fit, text)
+    gain = f"# RMS of poses that the fit has not seen: {1e3 * before:.2f} um without, "
     return ProposedTerm(
         formula=said,
-        text=formula.table(f"found-{number + 1}", says, "abc"),
+        text=f"{gain}{1e3 * after:.2f} um with it.\n{text}",
         selected=found,
         explains_mm=float(np.sqrt(np.mean(np.sum(moved**2, axis=0)))),
+        held_out_mm=(before, after),
     )
+
+
+def _held_out_with(fit: Fit, text: str) -> float:
+    """RMS, mm, of poses that the fit has not seen with one more effect; nan without such a fit."""
+    effect = effect_from_text(text, "proposal")
+    try:
+        larger = fit_effects(fit.model.rows, [*fit.model.effects, effect], begun=fit)
+    except BadInput:
+        return float("nan")
+    return hold_out(larger).rms_mm
