@@ -21,6 +21,7 @@ from app.hosted.parameters import effect_of
 from app.jobs.chosen_runs import File
 from app.jobs.corrector import machine_of
 from app.jobs.urdf import urdf_of
+from app.templating import compiled
 from calib.command.identified import commandable
 from calib.effects.struts import struts_of
 from calib.errors import BadInput
@@ -191,7 +192,7 @@ def rendered(template: str, found: Corrected, place: str) -> str:
     )  # fmt: skip
     environment.globals["refuse"] = _refuse
     try:
-        return environment.from_string(template).render(_told(found))
+        return compiled(environment, template).render(_told(found))
     except jinja2.TemplateSyntaxError as error:
         raise _fault(str(error.message), place, error.lineno) from error
     except _Refusal as error:
@@ -202,7 +203,7 @@ def rendered(template: str, found: Corrected, place: str) -> str:
         raise BadInput(error.what, place=place, remedy=error.remedy) from error
     except (jinja2.TemplateError, ArithmeticError, LookupError, TypeError, ValueError) as error:
         raise _fault(f"{type(error).__name__}: {error}", place, _line_of(error)) from error
-    except (AttributeError, RecursionError, MemoryError) as error:
+    except (AttributeError, RecursionError, MemoryError, SyntaxError) as error:
         raise _fault(f"{type(error).__name__}: {error}", place, _line_of(error)) from error
 
 

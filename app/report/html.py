@@ -10,6 +10,7 @@ from jinja2.sandbox import SandboxedEnvironment
 from app.files.text import read_text
 from app.report.logo import logo_of
 from app.report.page import Page
+from app.templating import compiled
 from calib.errors import BadInput
 
 TEMPLATE = "record.html"
@@ -32,7 +33,7 @@ def html_of(page: Page, template: str = "") -> str:
     logo = logo_of(page.logo)
     address = _address(logo.media_type, logo.content) if logo else ""
     try:
-        return environment.from_string(source).render(record=data, pictures=addresses, logo=address)
+        return compiled(environment, source).render(record=data, pictures=addresses, logo=address)
     except (jinja2.TemplateError, ArithmeticError, LookupError, TypeError, ValueError) as error:
         line = getattr(error, "lineno", None)
         place = f"{template or TEMPLATE}{f', line {line}' if line else ''}"
