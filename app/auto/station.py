@@ -41,6 +41,7 @@ class StationLaboratory:
     """
 
     def __init__(self, station: Station, folder: Path, *, unattended: bool) -> None:
+        _ = station.site.tracker  # it verifies with one: a site with a gauge is refused at once
         self._station, self._folder, self._unattended = station, folder, unattended
         self._running: Session | WriteBack | None = None
 

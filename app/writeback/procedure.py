@@ -104,6 +104,8 @@ class WriteBack:
 
         Raises
         ------
+        BadInput
+            If the site has no tracker to measure check poses with.
         GateRefused
             If a gate or the person said no; the earlier set is back.
         DeviceError
@@ -111,6 +113,7 @@ class WriteBack:
         StoppedByOperator
             If the operator stopped; the earlier set is back.
         """
+        _ = self.station.site.tracker  # check poses are measured with it: refused before anything
         held, proposal = await self.propose()
         snapshots = snapshots_of(self.station)
         snapshot = snapshots.save(held, f"before applying {Path(self.fit.source).name}")
