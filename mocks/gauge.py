@@ -19,8 +19,8 @@ LAG_S = 0.15
 NOISE_MM, STEP_MM = 0.0006, 0.001
 TRAVEL = {"dial": (0.0, 12.7), "bar": (-25.0, 25.0)}
 """What it can show, mm."""
-BAR_MM, BAR_WRONG_MM = 300.0, 0.04
-"""Length of the bar at zero as its label says, and what the label is off by."""
+BAR_WRONG_MM = 0.04
+"""What the label of a bar, its length at zero, is off by."""
 DIAL_AT_PLATE = 6.35
 PLATE_OFF_MM, PLATE_TILT = 0.25, (0.0012, -0.0008)
 _BACK = np.linspace(0.0, 4.0, 9)
@@ -38,6 +38,14 @@ class GaugeMock:
         self._count = 0
         home = world.nest_in_base(self.nest, np.array([clock.now()]))[0]
         self.plate_z = round(float(home[2]), 1)
+        self.bar_mm = self._usual_length(clock.now())
+
+    def _usual_length(self, now: float) -> float:
+        """A bar as a shop has it for this machine: about the middle of its pairs at home, mm."""
+        around = self._world.around
+        at = [self._world.nest_in_base(one, np.array([now]))[0] for one in around.platform_nests]
+        far = [np.array(one) for one in around.base_nests.values()]
+        return 10.0 * round(float(np.median([np.linalg.norm(a - b) for a in at for b in far])) / 10)
 
     def span(self, nest: str, nest2: str) -> None:
         """Set it between two nests; raises ValueError for nests that are none."""
@@ -85,7 +93,7 @@ class GaugeMock:
                 return None
             at = self._world.nest_in_base(self.between[0], times)
             far = np.array(self._world.around.base_nests[self.between[1]])
-            return np.asarray(np.linalg.norm(at - far, axis=1) - BAR_MM - BAR_WRONG_MM)
+            return np.asarray(np.linalg.norm(at - far, axis=1) - self.bar_mm - BAR_WRONG_MM)
         at = self._world.nest_in_base(self.nest, times)
         normal = np.array([*PLATE_TILT, 1.0])
         above = (at - [0.0, 0.0, self.plate_z + PLATE_OFF_MM]) @ normal / np.linalg.norm(normal)
@@ -93,9 +101,15 @@ class GaugeMock:
 
     def site(self) -> dict[str, Any]:
         """What a site file says of it, and of the plate that it touches."""
-        common = {"sigma": 0.002, "lowest": TRAVEL[self.kind][0], "highest": TRAVEL[self.kind][1]}
+        near = {} if self._world.kind == "hexapod" else {"near": 10.0}  # by their tolerances
+        common = {
+            **near,
+            "sigma": 0.002,
+            "lowest": TRAVEL[self.kind][0],
+            "highest": TRAVEL[self.kind][1],
+        }
         if self.kind == "bar":
-            own = {"reads": "distance", "zero_at": BAR_MM, "zero_sigma": 0.1, "name": "bar"}
+            own = {"reads": "distance", "zero_at": self.bar_mm, "zero_sigma": 0.1, "name": "bar"}
             return {"gauge": {**common, **own}}
         own = {
             "reads": "direction", "nest": self.nest, "plane": "plate", "zero_at": DIAL_AT_PLATE,

@@ -7,9 +7,12 @@ import numpy as np
 from app.files.poses import nest_matrix
 from app.files.site import Site
 from app.files.site_gauge import GaugeSite
+from app.session.spans import shows
+from calib.arrays import BoolArray
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.limits import Margin
+from calib.mechanism.rigid import Poses
 from calib.poses.gauges import (
     Bring,
     DistanceReadings,
@@ -87,7 +90,11 @@ def drawn_for(
     lift = gauge.clearance_mm * np.array(gauge.away)
     if bring is None and not np.any(lift):
         return None
-    return gauge_poses(site.machine, bring, lift, margin=margin)
+
+    def in_range(poses: Poses) -> BoolArray:
+        return np.array([shows(site, gauge, pose) for pose in poses.to_xyz_rpy().T.tolist()])
+
+    return gauge_poses(site.machine, bring, lift, margin=margin, shows=in_range)
 
 
 def _bring(site: Site, gauge: GaugeSite) -> Bring | None:

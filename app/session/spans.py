@@ -55,6 +55,13 @@ def within(site: Site, gauge: GaugeSite, pose: Pose, pair: tuple[str, str]) -> b
     return gauge.lowest <= shown(gauge, between(site, (pose, pose), pair)) <= gauge.highest
 
 
+def shows(site: Site, gauge: GaugeSite, pose: Pose) -> bool:
+    """Whether it shows a number at a pose: of a distance, for any of its pairs."""
+    if gauge.reads == "distance":
+        return any(within(site, gauge, pose, pair) for pair in gauge.pairs)
+    return gauge.lowest <= shown(gauge, along(site, gauge, pose)) <= gauge.highest
+
+
 def stays_in_range(
     site: Site, gauge: GaugeSite, poses: Mapping[str, Pose], pair: tuple[str, str], one: str,
     two: str,

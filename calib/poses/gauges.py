@@ -135,11 +135,17 @@ def to_span(ends: tuple[Array, Array], span: tuple[float, float]) -> Bring:
 
 
 def gauge_poses(
-    machine: Machine, bring: Bring | None, lift: Array, *, margin: Margin | None = None
+    machine: Machine,
+    bring: Bring | None,
+    lift: Array,
+    *,
+    margin: Margin | None = None,
+    shows: Callable[[Poses], BoolArray] | None = None,
 ) -> Callable[[int, np.random.Generator], PoseSet]:
     """How poses are drawn at which a gauge is in range, and from which it can be lifted.
 
-    ``lift`` (3,) is how far the platform moves to let go, mm, base frame.
+    ``lift`` (3,) is how far the platform moves to let go, mm, base frame; ``shows`` whether the
+    gauge is in range, where the machine cannot move as it is to be brought.
 
     Raises
     ------
@@ -157,6 +163,8 @@ def gauge_poses(
             if moves and bring is not None:
                 found = _moved(found, bring(found.poses, generator))
                 found = found.take(_inside(found) & reachable(machine, found.configuration, margin))
+            if not moves and shows is not None:
+                found = found.take(shows(found.poses))
             if moves and np.any(lift):
                 up = _moved(found, np.repeat(lift[:, None], found.count, axis=1))
                 found = found.take(reachable(machine, up.configuration, margin))

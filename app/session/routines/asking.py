@@ -163,7 +163,8 @@ async def _judged(
     work.set_aside(row)
     fault = NotReady(
         f"{about.where}: {why}", device="gauge",
-        remedy="See unit, zero_at and sign in the site file, and whether the gauge is held",
+        remedy="See unit, zero_at and sign in the site file, whether the gauge is held, and near "
+        "if the machine may be off so far",
     )  # fmt: skip
     take = (f"take {meant:.6g}",) if meant is not None and typed else ()
     keep = () if behind and found is None else (KEEP,)
