@@ -87,7 +87,7 @@ def _as_found(before: Checked, tolerance: Tolerance) -> list[str]:
     if not judged:
         return []
     passed = all(one.passed for one in judged)
-    told = "; ".join(_told(one) for one in judged)
+    told = ". ".join(_told(one) for one in judged)
     return [f"As found, by the same rule: {'PASS' if passed else 'FAIL'}. {told}."]
 
 
@@ -95,7 +95,7 @@ def _verdict(last: Checked, named: str, tolerance: Tolerance) -> list[Block]:
     judged = judge_tolerance(last, tolerance)
     if not judged:
         return []
-    said = "; ".join(_told(one) for one in judged)
+    said = ". ".join(_told(one) for one in judged)
     passed = all(one.passed for one in judged)
     words = f"The machine {named}, at the {len(last.labels)} poses of the verification. {said}."
     return [Verdict("PASS" if passed else "FAIL", words)]

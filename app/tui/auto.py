@@ -1,6 +1,5 @@
 """Auto: the autopilot; what is wanted, what it decides and why, and the person's say in it."""
 
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
@@ -20,6 +19,7 @@ from app.tui.face import Face
 from app.tui.picture import Picture
 from app.tui.planning import NewFlight
 from app.tui.widgets.plots import TargetPlot
+from app.tui.wording import micro
 
 BAR = 30
 """Signs of a bar; the target stands in its middle."""
@@ -136,7 +136,7 @@ def goal_text(flight: Automatic, lines: Sequence[Mapping[str, Any]]) -> Content:
         _against("predicted", found[-1]["predicted_um"] if found else None, limits.target_um),
         _against("fresh poses", seen[-1]["verified_um"] if seen else None, limits.target_um,
                  f"95 %: at most {seen[-1]['at_most_um']:.1f}" if seen else ""),
-        Content(_micro(found_words(found[-1]) if found else "")),
+        Content(micro(found_words(found[-1]) if found else "")),
     ]  # fmt: skip
     return Content("\n").join(shown)
 
@@ -165,8 +165,8 @@ def now_text(flight: Automatic, lines: Sequence[Mapping[str, Any]], picture: Pic
     return Content("\n").join(
         [
             Content.assemble((f"{number}  {does(last)}", "bold")),
-            Content(_micro(last.why)),
-            Content.assemble((_micro(gained(last)), "dim")),
+            Content(micro(last.why)),
+            Content.assemble((micro(gained(last)), "dim")),
             Content(_doing(flight, picture, ended=ended and last.kind == "stop")),
         ]
     )
@@ -203,14 +203,14 @@ def decided_text(lines: Sequence[Mapping[str, Any]]) -> Content:
             case "decided":
                 head = Content.assemble(
                     (f"{line['number']}  {does(decision_of(line))}", "bold"),
-                    (f"   {_micro(line['why'])}", "dim"),
+                    (f"   {micro(line['why'])}", "dim"),
                 )
                 blocks.append([head])
             case "done" if blocks and _came(line):
                 sign = ("– ", "$warning") if line.get("vetoed") else ("✓ ", "$success")
                 blocks[-1].append(Content.assemble("   ", sign, _came(line)))
             case "found" if blocks:
-                blocks[-1].append(Content(f"   {_micro(found_words(line))}"))
+                blocks[-1].append(Content(f"   {micro(found_words(line))}"))
     if not blocks:
         return Content.from_markup("[dim]nothing yet[/]")
     return Content("\n").join(part for block in reversed(blocks) for part in block)
@@ -220,12 +220,7 @@ def _came(line: Mapping[str, Any]) -> str:
     if "run" in line:
         session = Path(line["run"]).parent.name
         return f"{line['poses']} poses in {line['minutes']:.0f} min of machine time: {session}"
-    return _micro(str(line.get("says", "")))
-
-
-def _micro(text: str) -> str:
-    """The screens' sign for micrometres."""
-    return re.sub(r"\bum\b", "µm", text)
+    return micro(str(line.get("says", "")))
 
 
 def series(

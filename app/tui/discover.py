@@ -18,7 +18,7 @@ from app.tui.face import Face
 from app.tui.picture import Picture
 from app.tui.widgets.plots import BinPlot
 from app.tui.widgets.tables import fill
-from app.tui.wording import p_text
+from app.tui.wording import micro, p_text
 from calib.digits import plus_minus
 
 STAIRS, STAIRS_LOW = 4, 3
@@ -250,8 +250,8 @@ def advice_text(view: "View | None") -> Content:
     told = [
         said for said in remark_lines(diagnosis) if said.split(". ")[0] not in diagnosis["advice"]
     ]
-    first = [(f"{said}\n", "$warning") for said in told]
-    text = Content.assemble(*first, mark, diagnosis["advice"])
+    first = [(f"{micro(said)}\n", "$warning") for said in told]
+    text = Content.assemble(*first, mark, micro(diagnosis["advice"]))
     for group in diagnosis["indistinguishable"]:
         if all(name in diagnosis["advice"] for name in group):
             continue  # the answer says so itself

@@ -17,6 +17,7 @@ from app.tui.face import Face
 from app.tui.picture import Picture
 from app.tui.widgets.plots import PairPlot
 from app.tui.widgets.tables import fill
+from app.tui.wording import micro
 from calib.digits import Digits, fixed
 
 if TYPE_CHECKING:
@@ -158,7 +159,8 @@ def words(answer: "FitAnswer | None") -> Content:
     report = answer.report
     chi2 = report["chi2_per_dof"]
     parts: list[Content] = [
-        Content.from_markup("[$warning]![/] $said", said=said) for said in remark_lines(report)
+        Content.from_markup("[$warning]![/] $said", said=micro(said))
+        for said in remark_lines(report)
     ]
     if chi2 is not None and chi2 > 1.25:
         parts.append(

@@ -19,7 +19,7 @@ from app.tui.history_view import series_of
 from app.tui.picture import Picture
 from app.tui.widgets.plots import SeriesPlot
 from app.tui.widgets.tables import fill
-from app.tui.wording import p_text
+from app.tui.wording import micro, p_text
 
 if TYPE_CHECKING:
     from app.jobs.looking_back import MachineEntry, SeriesEntry
@@ -131,7 +131,7 @@ def events_text(machine: "MachineEntry | None") -> Content:
     signs = {"applied": "▶", "fit": "·", "verification": "✓"}
     return Content("\n").join(
         Content.assemble((f"{clock(event.utc)}  ", "dim"),
-                         f"{signs.get(event.kind, ' ')} {event.kind:<12}  {event.says}")
+                         f"{signs.get(event.kind, ' ')} {event.kind:<12}  {micro(event.says)}")
         for event in reversed(machine.events)
     )  # fmt: skip
 
@@ -171,4 +171,4 @@ def words_of(one: "SeriesEntry") -> Content:
     else:
         sign = "moves" if one.drift.clear else "no drift beyond chance:"
         lines.append(f"{sign} {drift_words(one.drift, one.unit)}".replace("+-", "±"))
-    return Content("\n".join(lines))
+    return Content(micro("\n".join(lines)))

@@ -7,12 +7,13 @@ session (:meth:`Picture.of_session`) and the events that follow.
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from app.session import events as ev
 from app.session.gauge_rows import GAUGE, before, numbers
 from app.session.session import Session
+from app.tui.wording import micro
 from drivers.interface import Alarm
 
 KEPT = 2000
@@ -149,19 +150,19 @@ class Picture:
 
     def write(self, text: str, level: Level = "info", time_s: float | None = None) -> None:
         """Add a line to the log."""
-        self.log.append(LogLine(time_s, level, text))
+        self.log.append(LogLine(time_s, level, micro(text)))
         self.logged += 1
         self.revision += 1
 
     def say_trouble(self, what: str, remedy: str, level: Literal["warn", "bad"] = "bad") -> None:
         """Put something on the banner and into the log."""
-        self.trouble = Trouble(what, remedy, level)
+        self.trouble = Trouble(micro(what), micro(remedy), level)
         self.write(f"{what}. {remedy}" if remedy else what, level)
 
     def refuse(self, what: str, remedy: str) -> None:
         """Say why a key did nothing, until another one is pressed."""
         self.say_trouble(what, remedy)
-        self.trouble = Trouble(what, remedy, passing=True)
+        self.trouble = Trouble(micro(what), micro(remedy), passing=True)
 
     def pass_on(self) -> None:
         """Take the answer to the last key away."""
@@ -208,7 +209,7 @@ def _alarm(picture: Picture, event: ev.AlarmRaised) -> None:
     text = f"{alarm.device}: {alarm.what}"
     picture.write(f"{text}. {alarm.remedy}" if alarm.remedy else text, level, event.time_s)
     if alarm.fault:
-        picture.trouble = Trouble(text, alarm.remedy)
+        picture.trouble = Trouble(micro(text), micro(alarm.remedy))
 
 
 def _step_started(picture: Picture, event: ev.StepStarted) -> None:
@@ -307,7 +308,7 @@ def _drift(picture: Picture, event: ev.DriftChecked) -> None:
 
 
 def _prompt(picture: Picture, event: ev.PromptNeeded) -> None:
-    picture.prompt = event
+    picture.prompt = replace(event, text=micro(event.text))
     picture.write(f"asked: {event.text}")
 
 
@@ -364,7 +365,7 @@ def _finished(picture: Picture, event: ev.Finished) -> None:
 
 
 def _gate(picture: Picture, event: ev.GateChecked) -> None:
-    picture.gates.append(event)
+    picture.gates.append(replace(event, says=micro(event.says), unit=micro(event.unit)))
     picture.write(
         f"gate {event.gate}: {'passed' if event.passed else 'REFUSED'}, {event.says}",
         "info" if event.passed else "bad",
@@ -372,7 +373,7 @@ def _gate(picture: Picture, event: ev.GateChecked) -> None:
 
 
 def _stage(picture: Picture, event: ev.WriteBackStage) -> None:
-    picture.stages.append(event)
+    picture.stages.append(replace(event, says=micro(event.says)))
     bad = event.stage == "restore-failed"
     picture.write(f"write-back: {event.says}", "bad" if bad else "info")
 

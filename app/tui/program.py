@@ -33,7 +33,7 @@ from app.tui.theme import BENCH
 from app.tui.verify import VerifyFace
 from app.tui.watch import WatchFace
 from app.tui.widgets.frame import STOP_KEY
-from app.tui.wording import said
+from app.tui.wording import micro, said
 from calib.errors import BadInput
 from drivers.errors import DeviceError
 
@@ -162,7 +162,7 @@ class Workbench(Painted[None]):
 
         A fault of the job stands there already, in its own words, which say how to go on.
         """
-        what, remedy = said(error)
+        what, remedy = map(micro, said(error))
         picture = self.desk.picture
         if picture.trouble is not None and picture.trouble.what.startswith(what):
             return

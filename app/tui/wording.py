@@ -1,9 +1,12 @@
 """Words for errors and channels."""
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
 from calib.toml_faults import ManyFaults
+
+_UM = re.compile(r"(?<![\w/.-])um(?![\w/-]|\.\w)")
 
 
 def said(error: Exception) -> tuple[str, str]:
@@ -17,6 +20,14 @@ def said(error: Exception) -> tuple[str, str]:
     where = device or place
     remedy = str(getattr(error, "remedy", ""))
     return (f"{where}: {what}" if where else what), remedy
+
+
+def micro(text: str) -> str:
+    """Words of the program as the screens show them: ``um`` is micrometres, in no path or name.
+
+    A terminal that has no such sign gets its ``u`` back (:mod:`app.tui.signs`).
+    """
+    return _UM.sub("µm", text)
 
 
 def channel_text(channels: Mapping[str, Any]) -> str:

@@ -23,7 +23,7 @@ async def test_what_changed_and_what_drifts_stand_first_with_a_forecast(tmp_path
     assert [one.name for one in series][:2] == ["leg1.L0", "leg3.L0"]
     assert told(series).startswith("5 calibrations; ")
     drifts = words_of(series[1]).plain
-    assert "um a month; out of tolerance" in drifts
+    assert "µm a month; out of tolerance" in drifts
     assert "no more than chance" in words_of(series[-1]).plain
 
 

@@ -7,6 +7,7 @@ import pytest
 from test_tui_terminal import Terminal
 
 from app.tui.signs import in_ascii, only_ascii
+from app.tui.wording import micro
 
 APP = Path(__file__).parents[2] / "app"
 
@@ -58,3 +59,10 @@ def test_nothing_but_ascii_is_sent_where_there_is_nothing_else(
         assert re.search("STOP", terminal.said)
     finally:
         terminal.end()
+
+
+def test_micrometres_have_one_sign_on_the_screens_and_paths_keep_their_letters() -> None:
+    assert micro("RMS 5.1 um (limit 50 um): 12 um.") == "RMS 5.1 µm (limit 50 µm): 12 µm."
+    for name in ("runs/um/run", "um.toml", "album", "um-2"):
+        assert micro(f"in {name}") == f"in {name}"
+    assert in_ascii(micro("7 um")) == "7 um"
