@@ -102,6 +102,19 @@ class HintEntry(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
+class ImpossibleEntry(Record):
+    """An effect called for weakly that was refused, as physics forbids its ``value``.
+
+    ``otherwise``: which mistake in the files would make that sign, if it is not chance.
+    """
+
+    effect: str
+    p_value: float
+    value: str
+    otherwise: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class NoiseComponentEntry(Record):
     """A component of the noise: ``correlated`` (its time constant, s), ``visit`` or ``scale``.
 
@@ -202,6 +215,7 @@ class DiscoveryReport(Report):
     unavailable: Mapping[str, str]
     parameters: tuple[SizeEntry, ...]
     refused: tuple[str, ...]
+    impossible: tuple[ImpossibleEntry, ...] = ()
     advice: str
     _found: Discovery = field(repr=False, compare=False)
     _runs: tuple[str, ...] = field(repr=False, compare=False)

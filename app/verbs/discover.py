@@ -101,6 +101,10 @@ def words(report: dict[str, Any]) -> str:
     lines += [
         f"Perhaps besides: {hint['effect']} (p = {hint['p_value']:.1g})" for hint in report["hints"]
     ]
+    lines += [
+        f"Refused, its value cannot be: {one['effect']} (p = {one['p_value']:.1g}), {one['value']}"
+        for one in report["impossible"]
+    ]
     if report["unexplained"]["significant"]:
         channels = ", ".join(report["unexplained"]["channels"])
         lines.append(f"Structure is left that no known effect explains; it depends on: {channels}")

@@ -7,11 +7,12 @@ from functools import cached_property, partial
 import numpy as np
 
 from calib.discover.diagnosis import RunDiagnosis
+from calib.discover.impossible import forbidden_value
 from calib.discover.noise import judge
 from calib.effects.component import Effect
 from calib.errors import BadInput
 from calib.evidence.findings import Diagnosis
-from calib.evidence.forward import Discovery, discover
+from calib.evidence.forward import Discovery, Stage, discover
 from calib.evidence.tails import log_tail
 from calib.identify.fitting import Fit
 from calib.identify.holdout import hold_out
@@ -139,7 +140,12 @@ def discover_run(refit: Refitter, begin: tuple[str, ...] = ()) -> Discovery:
     Those that the record itself shows come first.
     """
     shown = tuple(name for name in refit.rows.known if name not in begin)
-    return discover(refit, begin, keep=(*begin, *shown), first=shown)
+    return discover(refit, begin, keep=(*begin, *shown), first=shown, forbids=_forbids)
+
+
+def _forbids(stage: Stage, name: str) -> bool:
+    assert isinstance(stage, RunStage)
+    return bool(forbidden_value(stage.run, name))
 
 
 def stage_of(discovery: Discovery, step: int = -1) -> RunStage:

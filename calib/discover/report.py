@@ -15,6 +15,7 @@ from calib.discover.agreement import (
 from calib.discover.carrier import carriers, motion_words
 from calib.discover.diagnosis import RunDiagnosis
 from calib.discover.discovery import stage_of
+from calib.discover.impossible import chance_words, forbidden_best, impossible_entry
 from calib.discover.likeness import likeness_of, likeness_of_found, likeness_words
 from calib.discover.noise_report import noise_report, noise_words
 from calib.discover.problem import TIMES_Q
@@ -71,7 +72,7 @@ def discovery_report(discovery: Discovery) -> dict[str, Any]:
             for number, step in enumerate(discovery.steps)
         ],
         "effects": list(discovery.last.effects),
-        **_verdict(last, record),
+        **_verdict(last, record, discovery.impossible),
         "record": plain_remarks(record),
         "indistinguishable": [list(group) for group in _groups(discovery)],
         "unexplained": _unexplained(last.diagnosis),
@@ -79,25 +80,30 @@ def discovery_report(discovery: Discovery) -> dict[str, Any]:
         "noise": noise_report(last),
         "bad_readings": bad_readings(last.fit),
         "parameters": effect_parameters(last.fit),
-        "refused": list(discovery.refused),
+        "refused": [name for name in discovery.refused if name not in discovery.impossible],
         "unavailable": last.unavailable,
-        "advice": advice(last, record, discovery.refused, likeness_of_found(discovery)),
+        "impossible": [impossible_entry(last, name) for name in discovery.impossible],
+        "advice": advice(
+            last, record, discovery.refused, likeness_of_found(discovery), discovery.impossible
+        ),
     }
 
 
-def _hinted(found: RunDiagnosis) -> tuple[str, ...]:
-    return hints(found.diagnosis, [effect.id for effect in found.fit.model.effects])
+def _hinted(found: RunDiagnosis, impossible: Sequence[str] = ()) -> tuple[str, ...]:
+    return hints(found.diagnosis, [effect.id for effect in found.fit.model.effects], impossible)
 
 
-def _verdict(found: RunDiagnosis, record: Sequence[Remark]) -> dict[str, Any]:
+def _verdict(
+    found: RunDiagnosis, record: Sequence[Remark], impossible: Sequence[str] = ()
+) -> dict[str, Any]:
     """Whether the model will do: nothing is called for but hints, and the record is sound."""
-    named = _hinted(found)
+    named = _hinted(found, impossible)
     return {
         "adequate": (found.diagnosis.adequate or bool(named)) and settled(record),
         "hints": [
             {"effect": one.name, "p_value": one.p_value}
             for one in found.diagnosis.findings
-            if one.name in named
+            if one.name in named and one.name not in impossible
         ],
     }
 
@@ -214,8 +220,11 @@ def advice(
     record: Sequence[Remark] = (),
     refused: Sequence[str] = (),
     likeness: dict[str, Any] | None = None,
+    impossible: Sequence[str] = (),
 ) -> str:
     """One sentence for the operator: what to do next; ``refused`` by the held-out poses.
+
+    ``impossible``: refused for a value that physics forbids.
 
     What is wrong with the record comes before all physics.
     """
@@ -223,13 +232,14 @@ def advice(
     if first and not runs_at_odds(found.fit):
         return f"{first[0].says}. {first[0].remedy}; then ask again."
     alike = likeness or (likeness_of(found.diagnosis) if found.diagnosis.best is None else None)
-    return _of_physics(found, refused, alike)
+    return _of_physics(found, refused, alike, impossible)
 
 
 def _of_physics(
     found: RunDiagnosis,
     refused: Sequence[str],
     likeness: dict[str, Any] | None,
+    impossible: Sequence[str],
 ) -> str:
     diagnosis = found.diagnosis
     bad = len(found.fit.bad)
@@ -245,7 +255,11 @@ def _of_physics(
     scatter = "" if of_noise else untrue_uncertainties(found.fit)
     if told:
         excluded = f" As to noise: {told}.{excluded}"
-    if hinted := _hinted(found):
+    hinted = _hinted(found, impossible)
+    forbidden = tuple(impossible) or forbidden_best(found)
+    if forbidden and set(hinted) <= set(impossible):
+        return f"{chance_words(found, forbidden)}{excluded}"
+    if hinted := tuple(name for name in hinted if name not in impossible):
         return (
             f"Nothing else is clearly missing. {' and '.join(hinted)} might be there too, but one "
             f"run in twenty looks so by chance: pkmcal design --discriminate {hinted[0]} nothing "

@@ -60,6 +60,8 @@ class Discovery:
     steps: tuple[Revision, ...]
     refused: tuple[str, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
+    impossible: tuple[str, ...] = ()
+    """Effects refused for a value that nothing has: called for so weakly that it is chance."""
 
     @property
     def last(self) -> Stage:
@@ -73,6 +75,7 @@ def discover(
     *,
     keep: Sequence[str] = (),
     first: Sequence[str] = (),
+    forbids: Callable[[Stage, str], bool] = lambda stage, name: False,
 ) -> Discovery:
     """Go from the effects ``begin`` to a model from which nothing known is missing.
 
@@ -86,18 +89,26 @@ def discover(
         Effects that stay: those that the operator has put in, and ``first``.
     first : sequence of str
         Effects that are added before any is looked for.
+    forbids : callable
+        Whether physics forbids the value that an effect would have in a stage. A weak call for such
+        a one is refused, and then nothing else is added on a weak call either.
     """
     steps = [Revision(refit(begin))]
     for name in first:
         steps.append(Revision(refit((*steps[-1].stage.effects, name)), added=name))
     refused: list[str] = []
     groups: list[tuple[str, ...]] = []
+    impossible: list[str] = []
     while len(steps) <= MOST_STEPS:
         now = steps[-1].stage
         discovered = len(steps) > 1 + len(first)
-        added = _next(now, refused, WEAK if discovered else ALPHA)
+        added = _next(now, refused, WEAK if discovered or impossible else ALPHA)
         if added is None:
             break
+        if weakly(now.diagnosis, added) and forbids(now, added):
+            refused.append(added)
+            impossible.append(added)
+            continue
         tried = refit((*now.effects, added))
         if speaks_against(now.holdout, tried.holdout):
             refused.append(added)
@@ -106,11 +117,17 @@ def discover(
         own = [group for group in now.diagnosis.indistinguishable if group[0] == added]
         groups += [group for group in own if group not in groups]
         steps.append(Revision(tried, added=added))
-        refused = []
+        refused, impossible = [], []
     steps += _superfluous(refit, steps, frozenset((*begin, *keep)))
     last = steps[-1].stage.effects
     here = [group for group in groups if set(group) & set(last)]
-    return Discovery(tuple(steps), tuple(refused), tuple(here))
+    return Discovery(tuple(steps), tuple(refused), tuple(here), tuple(impossible))
+
+
+def weakly(diagnosis: Diagnosis, name: str) -> bool:
+    """Whether an effect is called for by a p-value that chance may well make."""
+    found = next((one for one in diagnosis.findings if one.name == name), None)
+    return found is not None and not significant(found.log_p, WEAK)
 
 
 def speaks_against(before: float, after: float) -> bool:
@@ -139,13 +156,20 @@ def _next(stage: Stage, refused: Sequence[str], limit: float) -> str | None:
     return next((name for name in offered if name in clear and name not in refused), None)
 
 
-def hints(diagnosis: Diagnosis, effects: Sequence[str]) -> tuple[str, ...]:
+def hints(
+    diagnosis: Diagnosis, effects: Sequence[str], impossible: Sequence[str] = ()
+) -> tuple[str, ...]:
     """Effects that a model with ``effects`` might have besides, called for too weakly to be added.
 
-    Where nothing is in the model yet there are none: the first question is one question.
+    Where nothing is in the model yet there are none: the first question is one question. It has
+    been answered where what was called for first is ``impossible``.
     """
     called = diagnosis.explained_by
-    if not effects or diagnosis.unknown_preferred or diagnosis.unexplained.significant:
+    if (
+        not (effects or impossible)
+        or diagnosis.unknown_preferred
+        or diagnosis.unexplained.significant
+    ):
         return ()
     weak = {f.name for f in diagnosis.findings if not significant(f.log_p, WEAK)}
     return called if all(name in weak for name in called) else ()

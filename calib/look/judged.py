@@ -27,6 +27,8 @@ NOTICEABLE = 0.2
 """Part of its usual size from which on a sign counts."""
 TOO_LARGE = 300.0
 """Times its usual size that no machine has; and the part of it that nobody can have seen."""
+NOBODY = 400.0
+"""Chi-square per degree of freedom that no fit has that could be meant."""
 BEYOND = 20.0
 """Standard deviations of its tolerance that no machine is off."""
 
@@ -34,7 +36,8 @@ BEYOND = 20.0
 def record_of(fitted: Fit) -> tuple[Remark, ...]:
     """What is said first of a fit: of the record, of the readings left out, of sizes and signs."""
     together = groups(fitted)
-    return (
+    return _or_unexplained(
+        fitted,
         *(as_fitted(remark, fitted) for remark in fitted.model.rows.remarks),
         *(group.remark for group in together),
         *_left_out(fitted, {row for group in together for row in group.rows}),
@@ -43,6 +46,30 @@ def record_of(fitted: Fit) -> tuple[Remark, ...]:
             remark
             for effect, found in _estimates(fitted)
             for remark in judged(effect, found, fitted)
+        ),
+    )
+
+
+def _or_unexplained(fitted: Fit, *found: Remark) -> tuple[Remark, ...]:
+    """What was found; and where that leaves a fit that nobody can mean, that it does."""
+    scatter = fitted.chi2_per_dof
+    if not scatter > NOBODY or not settled(found):
+        return found
+    apart = float(np.sqrt(np.mean(np.sum(fitted.linear.residual[:, fitted.accepted] ** 2, axis=0))))
+    return (
+        *found,
+        Remark(
+            "misfit-unexplained",
+            f"The readings are off by {apart:.3g} mm (RMS), {np.sqrt(scatter):.0f} times what is "
+            "stated of them: the record, or the machine, is not what the files say",
+            (),
+            "No single mistake of those that are tried explains it, and no machine within its "
+            "tolerances",
+            "Fitted as it stands; it is not called adequate",
+            "See the nest tables, q, whether anything was moved, and sx, sy, sz; then ask discover "
+            "what the residual depends on",
+            False,
+            fitted.model.rows.runs[0].source,
         ),
     )
 
@@ -167,6 +194,17 @@ def judged(effect: Effect, found: Sequence[Estimate], fitted: Fit) -> Iterator[R
         else:
             continue
         return
+
+
+def forbidden(effect: Effect, found: Sequence[Estimate]) -> str:
+    """The value that physics forbids, in words, if the clearest unknown has the wrong sign."""
+    linear = [one for one in found if not one.unknown.nonlinear and one.sigma > 0.0]
+    if not effect.wrong_sign or not linear:
+        return ""
+    clearest = max(linear, key=lambda one: abs(one.value) / one.sigma)
+    if clearest.value >= 0.0:
+        return ""
+    return f"{clearest.name} = {plus_minus(clearest.value, clearest.sigma, clearest.unit)}"
 
 
 def _units(effect: Effect) -> str:

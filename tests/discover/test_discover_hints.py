@@ -63,6 +63,25 @@ def test_a_first_effect_needs_no_more_than_before() -> None:
     assert staircase.last.effects == ("contact",)
 
 
+@pytest.mark.parametrize(("p", "refused"), [(5e-3, True), (1e-4, False)])
+def test_a_weak_call_for_a_value_that_cannot_be_is_chance(p: float, refused: bool) -> None:
+    class Faint(Lab):
+        def __call__(self, names: tuple[str, ...]) -> Any:
+            called = [(name, np.log(p)) for name in ("contact", "settling") if name not in names]
+            return SimpleNamespace(
+                effects=names,
+                holdout=10.0 - len(names),
+                diagnosis=diagnosis(*called),
+                doubtful=frozenset(),
+            )
+
+    staircase = discover(Faint(p), forbids=lambda stage, name: name == "contact")
+    assert staircase.impossible == (("contact",) if refused else ())
+    assert staircase.last.effects == (() if refused else ("contact", "settling"))
+    named = hints(staircase.last.diagnosis, staircase.last.effects, staircase.impossible)
+    assert named == (("contact", "settling") if refused else ())
+
+
 def test_likeness_is_the_cosine_between_what_is_there_and_the_nearest_effect() -> None:
     rng = np.random.default_rng(3)
     count, freedom = 400, 380.0
