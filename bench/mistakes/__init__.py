@@ -1,13 +1,14 @@
 """Everyday mistakes put into a clean run: what is done, and what should be said of it."""
 
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 
 from bench.mistakes import labels, motion, readings, units
 from bench.mistakes.clean import machine_named
+from bench.mistakes.everyday import EVERYDAY
+from bench.mistakes.mistake import Mistake
 from calib.arrays import Array
 from calib.discover.agreement import untrue_uncertainties
 from calib.effects import effect_named
@@ -17,18 +18,6 @@ from calib.look import first_look
 from calib.look.judged import record_of
 from calib.mechanism.description import Machine
 from calib.runs.record import Run
-
-Make = Callable[[Run, np.random.Generator], Run]
-
-
-@dataclass(frozen=True)
-class Mistake:
-    """What is done to a run, and which remarks say so (any of them); or how it is refused."""
-
-    make: Make
-    says: tuple[str, ...] = ()
-    refused: str = ""
-    only: tuple[str, ...] = ("hexapod", "tripod", "ptm")
 
 
 def _home(run: Run) -> Array:
@@ -80,7 +69,9 @@ _LABELS = {
     "base table 25 mm off in z": Mistake(
         labels.base_frame_off, ("nests-frame", "geometry-impossible")
     ),
-    "base table turned by 90 deg": Mistake(labels.base_turned, ("nests-turned",), "nest"),
+    "base table turned by 90 deg": Mistake(
+        labels.base_turned, ("nests-turned", "nests-exchanged"), "nest"
+    ),
     "one label for two poses": Mistake(labels.label_shared, ("pose-label-shared",)),
     "labels begin again with 1": Mistake(labels.labels_start_again, ("pose-label-shared",)),
 }
@@ -119,7 +110,7 @@ _COMMANDS = {
         lambda r, c: units.q_from_home(_home)(r, c), refused="from home", only=_LINEAR
     ),
     "q from home, wrong sign": Mistake(
-        lambda r, c: units.q_from_home(_home, -1.0)(r, c), refused="home"
+        lambda r, c: units.q_from_home(_home, -1.0)(r, c), refused="home|wrong sign"
     ),
     "one column of q counts the other way": Mistake(units.q_one_sign(_home), refused="sign"),
     "two columns of q exchanged": Mistake(units.q_exchanged, refused="exchange"),
@@ -265,6 +256,7 @@ _STATION = {
 }
 MISTAKES: Mapping[str, Mistake] = {
     **_LABELS, **_POINTS, **_COMMANDS, **_CLOCK, **_CHANNELS, **_READINGS, **_STATION,
+    **EVERYDAY,
 }  # fmt: skip
 """Every mistake by its name."""
 WRONG = ("silent", "wrong", "refused in other words", "named among others")

@@ -12,9 +12,12 @@ from calib.frames import Frame, align
 from calib.identify.staged import fit_effects
 from calib.mechanism.description import Machine
 from calib.mechanism.solve import forward
+from calib.model.prototype import prototype_run
+from calib.poses import sample_poses
 from calib.runs import parse_run
 from calib.runs.record import Run
 from calib.runs.stack import stack
+from mocks.arguments import MACHINES
 from mocks.hidden.table import Hidden
 from mocks.simulate.files import points_csv, run_toml
 from mocks.simulate.plan import Profile, RunPlan
@@ -34,7 +37,12 @@ def clean_run(
     machine: str, seed: int, *, poses: int = 40, order: str = "nest-by-nest",
     hidden: Mapping[str, float] | None = None, profile: Profile = PROFILE, noise_mm: float = 0.005,
 ) -> Run:  # fmt: skip
-    """A simulated run, 5 um an axis, read back as a file is read."""
+    """A simulated run, 5 um an axis, read back as a file is read.
+
+    A machine that there is no mock of is a virtual prototype, without hidden effects.
+    """
+    if machine not in MACHINES:
+        return _prototype(machine, seed, poses, order, noise_mm)
     plan = RunPlan(
         machine=machine,
         seed=seed,
@@ -47,6 +55,35 @@ def clean_run(
     return read_back(simulate(plan), machine)
 
 
+def _prototype(name: str, seed: int, poses: int, order: str, noise_mm: float) -> Run:
+    """A prototype's run with temperatures and a payload, nest by nest or pose by pose."""
+    machine, generator = machine_named(name), np.random.default_rng([seed, 5])
+    chosen = sample_poses(machine, poses, generator)
+    off = np.clip(generator.normal(size=machine.nominal.size), -2.0, 2.0)
+    parameters = machine.nominal + 0.7 * machine.prior_sigma * off
+    run = prototype_run(machine, name, chosen, parameters, noise_mm, generator).run
+    share = run.time_s / run.time_s[-1]
+    wander = generator.normal(size=share.size)
+    run = replace(
+        run,
+        position=np.round(run.position, 6),
+        channels={
+            "structure_temp_C": np.round(20.0 + 5.0 * share + 0.02 * wander, 3),
+            "air_temp_C": np.round(20.4 + 0.05 * generator.normal(size=share.size), 3),
+            "payload_kg": np.where(share > 0.5, 6.0, 0.0),
+        },
+    )
+    if order == "nest-by-nest":
+        return run
+    platform = [k for k in range(run.line.size) if run.nest[k] in run.header.platform_nests]
+    platform.sort(key=lambda k: int(run.pose[k]))
+    visits = [k for k in range(run.line.size) if run.nest[k] in run.header.base_nests]
+    half = len(platform) // 2 // 3 * 3
+    rows = [0, *visits[:8], *platform[:half], *visits[8:12], *platform[half:], *visits[12:]]
+    shuffled = in_order(run, rows)
+    return replace(shuffled, time_s=run.time_s, channels=run.channels)
+
+
 def read_back(made: SimulatedRun, machine: str) -> Run:
     """A simulated run as a file of it is read."""
     actuators = len(machine_named(machine).actuators)
@@ -56,6 +93,11 @@ def read_back(made: SimulatedRun, machine: str) -> Run:
 def read_rows(run: Run) -> IntArray:
     """Indices of the rows with readings."""
     return np.flatnonzero(run.measured)
+
+
+def read_nests(run: Run) -> list[str]:
+    """Nests on the platform that were read."""
+    return [name for name in run.header.platform_nests if name in run.nest]
 
 
 def on_platform(run: Run) -> BoolArray:

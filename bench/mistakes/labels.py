@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.mistakes.clean import at_rows, on_platform, read_rows, with_header
+from bench.mistakes.clean import at_rows, on_platform, read_nests, read_rows, with_header
 from calib.arrays import BoolArray
 from calib.runs.record import Run
 
@@ -130,7 +130,7 @@ def table_scaled(factor: float) -> Make:
 
 def one_number_wrong(run: Run, chance: Chance) -> Run:
     """One coordinate of one platform nest is off by 2 to 10 mm."""
-    name = str(chance.choice(list(run.header.platform_nests)))
+    name = str(chance.choice(read_nests(run)))
     off = np.zeros(3)
     off[chance.integers(3)] = chance.choice([-1.0, 1.0]) * chance.uniform(2.0, 10.0)
     table = {**run.header.platform_nests, name: run.header.platform_nests[name] + off}
@@ -139,7 +139,7 @@ def one_number_wrong(run: Run, chance: Chance) -> Run:
 
 def one_number_wrong_by_little(run: Run, chance: Chance) -> Run:
     """The first coordinate of one platform nest is off by 0.6 to 2 mm, across the nests' normal."""
-    name = str(chance.choice(list(run.header.platform_nests)))
+    name = str(chance.choice(read_nests(run)))
     off = np.array([chance.choice([-1.0, 1.0]) * chance.uniform(0.6, 2.0), 0.0, 0.0])
     table = {**run.header.platform_nests, name: run.header.platform_nests[name] + off}
     return with_header(run, platform_nests=table)

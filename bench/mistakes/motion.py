@@ -14,6 +14,7 @@ from bench.mistakes.clean import (
     moved_by,
     on_platform,
     platform_turns,
+    read_nests,
     read_rows,
     with_header,
 )
@@ -75,7 +76,7 @@ def other_smr(low: float, high: float, first: float = 0.0) -> Make:
     """One nest is read with an SMR of another radius, from a part of its readings on."""
 
     def make(run: Run, chance: Chance) -> Run:
-        name = str(chance.choice(list(run.header.platform_nests)))
+        name = str(chance.choice(read_nests(run)))
         rows = np.array([k for k in read_rows(run) if run.nest[k] == name])
         which = at_rows(run, rows[int(first * rows.size) :])
         return _lifted(run, which, chance.choice([-1.0, 1.0]) * chance.uniform(low, high))

@@ -10,18 +10,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.arrays import Array, BoolArray
-from calib.effects import effect_named
-from calib.errors import BadInput
 from calib.identify.fitting import Fit
-from calib.identify.staged import fit_effects
 from calib.look.digits import decimals_of
-from calib.look.scan import excess, scan
+from calib.look.gravity import weight_fall
+from calib.look.scan import excess, fit_of, scan
 from calib.look.seats import ALONG, normal_of, radii_in_words
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import rotate
 from calib.runs.record import Run
 from calib.runs.remark import Remark, ranges
-from calib.runs.stack import stack
 
 FALL = 100.0
 """Least fall of the cost by which such a hypothesis is held."""
@@ -73,7 +70,8 @@ def slip(fitted: Fit) -> Slip | None:
             best = Slip(int(kept[at]), k, values, fall)
     if best is None or best.fall < max(FALL, SLIP_SHARE * excess(fitted)):
         return None
-    if best.fall < _slow(fitted, best.actuator) + CLEAR or _put_on(fitted, best.row):
+    rivals = (_slow(fitted, best.actuator), _of_a_nest(fitted), weight_fall(fitted))
+    if best.fall < max(rivals) + CLEAR or _put_on(fitted, best.row):
         return None
     late = fitted.model.rows.time_s >= best.values[-1]
     return best if 0 < int(late.sum()) < late.size else None
@@ -97,6 +95,17 @@ def _slow(fitted: Fit, actuator: int) -> float:
     column = fitted.linear.situation.actuator_columns[actuator]
     columns = np.stack([column * shape for shape in shapes])[:, :, fitted.accepted]
     return float(scan(fitted, columns).fall[0])
+
+
+def _of_a_nest(fitted: Fit) -> float:
+    """Fall by the one nest that is off throughout: read in turn, nests step like an actuator."""
+    names = np.array(fitted.model.rows.nest_name, dtype=object)
+    falls = [
+        float(scan(fitted, _columns(fitted, names == name, platform=True)).fall[0])
+        for name in fitted.model.rows.runs[0].header.platform_nests
+        if np.any((names == name) & fitted.accepted)
+    ]
+    return max(falls, default=0.0)
 
 
 def slip_remark(fitted: Fit, found: Slip) -> Remark:
@@ -142,7 +151,7 @@ def table_frame(machine: Machine, run: Run, fitted: Fit) -> Mended | None:
     _, platform, offset = best
     if np.linalg.norm(offset) < SMALLEST_MM:
         return None
-    again = _fit(machine, _shifted(run, offset, platform=platform))
+    again = fit_of(machine, _shifted(run, offset, platform=platform))
     if again is not None:
         which = again.model.rows.on_platform == platform
         offset = offset + scan(again, _columns(again, which, platform=platform)).sizes[0]
@@ -198,7 +207,7 @@ def not_stated(machine: Machine, run: Run, fitted: Fit) -> Mended | None:
     if not run.header.controller_parameters or fitted.model.rows.known:
         return None
     nominal = replace(run, header=replace(run.header, controller_parameters={}))
-    again = _fit(machine, nominal)
+    again = fit_of(machine, nominal)
     if again is None:
         return None
     fall = excess(fitted) - excess(again)
@@ -242,11 +251,3 @@ def rounded_commands(run: Run, fitted: Fit) -> Remark | None:
         False,
         run.source,
     )
-
-
-def _fit(machine: Machine, run: Run, known: _Known | None = None) -> Fit | None:
-    try:
-        rows = replace(stack(machine, [run]), known=known or {})
-        return fit_effects(rows, [effect_named(name, machine) for name in rows.known])
-    except BadInput:
-        return None

@@ -12,6 +12,8 @@ FASTEST = 0.4
 """Least time, s, between readings at two commanded poses: move, settle, dwell."""
 SLOWEST, LONGEST = 1000.0, 1e5
 """Median time between two poses, and of the whole run, from which on it is no campaign in s."""
+LATE, TIMES = 7200.0, 2.0
+"""First time, s, and times the whole run, from which on it is a clock on the wall."""
 LEAST = 8
 """Fewest moves between poses that tell anything."""
 
@@ -21,16 +23,17 @@ def clock(run: Run) -> tuple[Run, list[Remark]]:
     gaps = _gaps(run)
     if gaps.size < LEAST:
         return run, []
+    run, remarks = _from_the_start(run)
     usual = float(np.median(gaps))
     if np.ptp(run.time_s) == 0.0:
-        return run, [_standing(run)]
+        return run, [*remarks, _standing(run)]
     if usual > SLOWEST and float(np.ptp(run.time_s)) > LONGEST:
-        return _read_as(run, "ms", 1e-3, usual)
+        return _read_as(run, "ms", 1e-3, usual, remarks)
     if 0.0 < usual < FASTEST:
         for unit, factor in (("minutes", 60.0), ("hours", 3600.0), ("days", 86400.0)):
             if usual * factor > FASTEST:
-                return _read_as(run, unit, factor, usual)
-    return run, []
+                return _read_as(run, unit, factor, usual, remarks)
+    return run, remarks
 
 
 def _gaps(run: Run) -> Array:
@@ -53,8 +56,31 @@ def _standing(run: Run) -> Remark:
     )
 
 
-def _read_as(run: Run, unit: str, factor: float, usual: float) -> tuple[Run, list[Remark]]:
+def _from_the_start(run: Run) -> tuple[Run, list[Remark]]:
+    """Times of a clock on the wall, or since 1970, counted from the first row."""
+    first, span = float(run.time_s[0]), float(np.ptp(run.time_s))
+    if first < LATE or first < TIMES * span:
+        return run, []
+    return replace(run, time_s=run.time_s - first), [
+        Remark(
+            "time-zero",
+            f"time_s begins at {first:.10g}: it is a time of day, or since 1970, not from the "
+            "start of the run",
+            (),
+            f"The whole run takes {span:.4g}",
+            "Counted from the first row",
+            "Write time_s in s from the start of the run",
+            True,
+            run.source,
+        )
+    ]
+
+
+def _read_as(
+    run: Run, unit: str, factor: float, usual: float, before: list[Remark]
+) -> tuple[Run, list[Remark]]:
     return replace(run, time_s=factor * run.time_s), [
+        *before,
         Remark(
             "time-unit",
             f"time_s looks like {unit}: {usual:.3g} between two poses is {usual * factor:.3g} s",
@@ -64,5 +90,5 @@ def _read_as(run: Run, unit: str, factor: float, usual: float) -> tuple[Run, lis
             "Write time_s in s",
             True,
             run.source,
-        )
+        ),
     ]

@@ -6,14 +6,16 @@ than one way to the same places.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
 from calib.arrays import Array
 from calib.errors import BadInput
+from calib.look.order import sorted_column
 from calib.look.places import Places, places_of
+from calib.look.way import Way, of_angles, of_one_axis
 from calib.mechanism.description import Machine
 from calib.runs.record import Run
 
@@ -39,20 +41,6 @@ class Misread(BadInput):
     def __init__(self, what: str, *, of: str, place: str = "", remedy: str = "") -> None:
         self.of = of
         super().__init__(what, place=place, remedy=remedy)
-
-
-@dataclass(frozen=True, eq=False)
-class Way:
-    """One way in which a run may have been written: ``run`` reads it so.
-
-    ``resized``: in another unit of length.
-    """
-
-    of: str
-    says: str
-    remedy: str
-    run: Run
-    resized: bool = False
 
 
 def check_lengths(machine: Machine, run: Run) -> None:
@@ -119,7 +107,8 @@ def _stretch(run: Run, nests: Mapping[str, Array], place: Sequence[str] | None) 
 
 def _is(ratios: Sequence[float], factor: float) -> bool:
     """Whether distances are ``factor`` times as long as stated, most of them."""
-    return bool(ratios) and abs(float(np.median(ratios)) / factor - 1.0) < STRETCH
+    near = np.abs(np.array(ratios) / factor - 1.0) < STRETCH
+    return bool(ratios) and float(np.mean(near)) > 0.5
 
 
 def check_conventions(machine: Machine, given: Run, places: Places | None, than: int = 0) -> None:
@@ -144,11 +133,12 @@ def check_conventions(machine: Machine, given: Run, places: Places | None, than:
     count = given.readings
     if now >= NOWHERE * count:
         return
+    _check_sorted(given)
     run = _thinned(given)
     few = int(run.measured.sum())
     more = 0 if places is None else max(now, than) + places.limit
     least = int(np.ceil(max(ENOUGH * few, more * few / count, LEAST_READINGS)))
-    tried = _of_positions(run) if than else ways(machine, run)
+    tried = _of_points(run) if than else ways(machine, run)
     best, most = _best(machine, _likely(given, tried), least)
     if best is None and not than:
         best, most = _best(machine, _likely(given, _two_ways(run)), least)
@@ -161,6 +151,19 @@ def check_conventions(machine: Machine, given: Run, places: Places | None, than:
         place=run.source,
         remedy=best.remedy,
     )
+
+
+def _check_sorted(run: Run) -> None:
+    """Refuse a column that was sorted by itself: the readings stand nowhere."""
+    name = sorted_column(run)
+    if name:
+        raise Misread(
+            f"column {name} is sorted by itself: it never falls from row to row, and the readings "
+            "stand in no nest",
+            of="position",
+            place=run.source,
+            remedy="Take the file as it was measured; sort whole rows, or none",
+        )
 
 
 def _likely(run: Run, tried: Iterator[Way]) -> Iterator[Way]:
@@ -202,9 +205,15 @@ def _best(machine: Machine, tried: Iterator[Way], least: int) -> tuple[Way | Non
 
 def ways(machine: Machine, run: Run) -> Iterator[Way]:
     """Every single way in which a run may have been written, the likeliest first."""
-    yield from _of_positions(run)
+    yield from _of_points(run)
     yield from _of_nests(run)
     yield from _of_coordinates(machine, run)
+
+
+def _of_points(run: Run) -> Iterator[Way]:
+    yield from _of_positions(run)
+    yield from of_angles(run)
+    yield from of_one_axis(run)
 
 
 def _of_positions(run: Run) -> Iterator[Way]:
@@ -251,7 +260,7 @@ def _of_coordinates(machine: Machine, run: Run) -> Iterator[Way]:
         return
     home = machine.home_q[:, None]
     turning = [actuator.unit == "rad" for actuator in machine.actuators]
-    if len(names) > 1 and len(set(turning)) == 1:
+    if len(names) > 3 and len(set(turning)) == 1:  # of fewer it is an exchange
         yield Way(
             "q",
             "the actuators are in reversed order",
@@ -284,6 +293,7 @@ def _of_coordinates(machine: Machine, run: Run) -> Iterator[Way]:
                 f"Exchange the columns q{a + 1} and q{b + 1}",
                 replace(run, q=q),
             )
+    yield from _never_moved(machine, run)
     for k, name in enumerate(names):
         for degrees in (90, -90, 180) if turning[k] else ():
             q = run.q.copy()
@@ -293,6 +303,22 @@ def _of_coordinates(machine: Machine, run: Run) -> Iterator[Way]:
                 f"the zero of q{k + 1}{_called(name)} is {-degrees} deg from that of the machine "
                 "file",
                 f"Add {degrees} deg to q{k + 1}",
+                replace(run, q=q),
+            )
+
+
+def _never_moved(machine: Machine, run: Run) -> Iterator[Way]:
+    """One actuator stood at home, or where it was first commanded, whatever q says."""
+    for k, actuator in enumerate(machine.actuators):
+        for place in dict.fromkeys((float(actuator.home), float(run.q[k, 0]))):
+            q = run.q.copy()
+            q[k] = place
+            yield Way(
+                "q",
+                f"{actuator.name} never moved: it stood at {place:.6g} {actuator.unit} whatever "
+                f"q{k + 1} says",
+                f"See the drive of {actuator.name} (disabled, clamped, not coupled), and measure "
+                "again",
                 replace(run, q=q),
             )
 

@@ -15,17 +15,21 @@ from calib.look.digits import rounding
 from calib.look.held import held_actuator
 from calib.look.labels import any_labels, mirrored_table, other_labels
 from calib.look.load import load_and_payload
-from calib.look.misfit import look_at_misfit, seat_refined
+from calib.look.misfit import look_at_misfit
 from calib.look.moved import moved_station, parts_of
 from calib.look.places import Places, places_of, points_of_one, roughly_known
 from calib.look.point_units import point_units
 from calib.look.pose_labels import pose_labels
 from calib.look.proposal import Proposal
 from calib.look.repeats import no_measurements
+from calib.look.rewritten import rewritten
+from calib.look.rivals import bears_out, better_story, with_fit
+from calib.look.seat_off import seat_refined
 from calib.look.seats import displaced_seat
-from calib.look.sigmas import sigmas
+from calib.look.sigmas import in_um, sigmas
 from calib.look.slid import check_columns, slid_rows
 from calib.look.slid_commands import slid_commands
+from calib.look.story import Story
 from calib.look.tables import turned_table
 from calib.look.temperatures import temperatures
 from calib.look.travel import check_travel
@@ -37,8 +41,8 @@ from calib.runs.stack import Rows, stack
 _Look = Callable[[Run], tuple[Run, list[Remark]]]
 _Hypothesis = Callable[[Places], Proposal | None]
 HYPOTHESES: tuple[_Hypothesis, ...] = (
-    other_labels, moved_station, mirrored_table, displaced_seat, any_labels, turned_table,
-    slid_rows, held_actuator,
+    other_labels, rewritten, displaced_seat, moved_station, mirrored_table, any_labels,
+    turned_table, slid_rows, held_actuator,
 )  # fmt: skip
 """What may explain readings that stand in no nest; the first that explains all is taken."""
 OF_COLUMNS: tuple[_Look, ...] = (clock, temperatures, load_and_payload)
@@ -81,24 +85,41 @@ def first_look(machine: Machine, runs: Sequence[Run]) -> Rows:
             looked.append(run)
             continue
         check_lengths(machine, run)
-        parts, of_places, shown = _places(machine, run)
-        if any(one.name == "rows-shifted" for one in of_places):  # labels were right, q was not
+        story = _in_units(machine, run, alone=len(runs) == 1)
+        if any(one.name == "rows-shifted" for one in story.remarks):
+            # labels were right, q was not
             of_rows = [one for one in of_rows if one.name != "pose-label-shared"]
-        if shown and len(runs) > 1:
-            parts = _parted(machine, run)
-            shown = {}
-        if len(parts) == 1:
-            parts, of_misfit, more = look_at_misfit(machine, parts[0], shown, alone=len(runs) == 1)
-            if shown and any(one.name in ONCE_MORE for one in of_misfit):
-                of_places = [one for one in of_places if one.name != "station-moved"]
-                shown = {}
-            shown = {**shown, **more}
-        else:
-            of_misfit = []
-        remarks += [*of_rows, *of_places, *of_misfit]
-        looked += parts
-        known = shown
+        remarks += [*of_rows, *story.remarks]
+        looked += story.parts
+        known = story.known
     return replace(stack(machine, looked), remarks=tuple(remarks), known=known)
+
+
+def _in_units(machine: Machine, run: Run, *, alone: bool) -> Story:
+    """The account of a run; with uncertainties in um where that alone makes sense of it."""
+    story = _account(machine, run, alone=alone)
+    unit = in_um(run)
+    if unit is None or any(one.name == unit.remark.name for one in story.remarks):
+        return story
+    other = with_fit(machine, _account(machine, unit.run, alone=alone))
+    if not bears_out(other):
+        return story
+    return replace(other, remarks=[unit.remark, *other.remarks])
+
+
+def _account(machine: Machine, run: Run, *, alone: bool) -> Story:
+    """What explains where the readings stand: by places, then by a misfit, then by trial."""
+    parts, of_places, shown = _places(machine, run)
+    if shown and not alone:
+        parts, shown = _parted(machine, run), {}
+    if len(parts) > 1:
+        first = Story(parts, of_places, shown)
+    else:
+        found = look_at_misfit(machine, parts[0], shown, alone=alone)
+        if shown and any(one.name in ONCE_MORE for one in found.remarks):
+            of_places = [one for one in of_places if one.name != "station-moved"]
+        first = replace(found, remarks=[*of_places, *found.remarks])
+    return better_story(machine, run, first, HYPOTHESES, alone=alone)
 
 
 def _serials(runs: Sequence[Run]) -> list[Remark]:

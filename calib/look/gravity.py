@@ -32,9 +32,7 @@ def gravity_elsewhere(fitted: Fit) -> Remark | None:
     size = float(np.linalg.norm(load.gravity))
     if size == 0.0 or abs(load.gravity[2]) > UPRIGHT * size:
         return None
-    sag = effect_named("gravity-sag", rows.machine)
-    payload = rows.channels.get("payload_kg", np.zeros(rows.count))
-    if sag.lacking(rows.machine) or sag.unavailable(rows) or not np.isfinite(payload).all():
+    if not _asked(fitted):
         return None
     stated, _ = _fall(fitted, load.gravity)
     upright, compliance = _fall(fitted, np.array([0.0, 0.0, -size]))
@@ -53,6 +51,27 @@ def gravity_elsewhere(fitted: Fit) -> Remark | None:
         False,
         rows.runs[0].source,
     )
+
+
+def _asked(fitted: Fit) -> bool:
+    """Whether a weight can show at all: a load is stated, and the payload of every reading."""
+    rows = fitted.model.rows
+    sag = effect_named("gravity-sag", rows.machine)
+    payload = rows.channels.get("payload_kg", np.zeros(rows.count))
+    known = bool(np.isfinite(payload).all())
+    return known and not sag.lacking(rows.machine) and not sag.unavailable(rows)
+
+
+def weight_fall(fitted: Fit) -> float:
+    """Fall of the cost by a weight that acts as stated, or downwards; 0 where none can show.
+
+    A payload that is put on at some moment moves what a step at that moment would move.
+    """
+    load = fitted.model.rows.runs[0].header.load
+    if load is None or len(fitted.model.rows.runs) > 1 or not _asked(fitted):
+        return 0.0
+    down = np.array([0.0, 0.0, -float(np.linalg.norm(load.gravity))])
+    return max(_fall(fitted, load.gravity)[0], _fall(fitted, down)[0])
 
 
 def _fall(fitted: Fit, gravity: Array) -> tuple[float, Array]:

@@ -23,6 +23,8 @@ LEAST = 4
 AGREE = 0.8
 """Part of the readings after a step that must fit the frame after it."""
 MOST_STEPS = 4
+FAR_MM, FAR_RAD = 200.0, 0.1
+"""A step beyond this is another station: the readings after it have a frame of their own."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +42,12 @@ def moved_station(places: Places) -> Proposal | None:
     if not steps:
         return None
     steps.sort(key=lambda step: step.at)
-    known = {"frame-shift": shift_values(places.rows.moment, steps[0])} if len(steps) == 1 else {}
-    return Proposal(int(explained.sum()), lambda: (places.run, _remark(places, steps)), known)
+    known = {}
+    if len(steps) == 1 and not _set_up_anew(places, steps[0]):
+        known = {"frame-shift": shift_values(places.rows.moment, steps[0])}
+    return Proposal(
+        int(explained.sum()), lambda: (places.run, _remark(places, steps, parted=not known)), known
+    )
 
 
 def parts_of(places: Places) -> list[Run]:
@@ -118,7 +124,7 @@ def _best_step(
     return best
 
 
-def _remark(places: Places, steps: list[Step]) -> Remark:
+def _remark(places: Places, steps: list[Step], *, parted: bool) -> Remark:
     run, rows = places.run, places.rows
     sizes = [_size(places, step) for step in steps]
     told = " and ".join(
@@ -127,9 +133,9 @@ def _remark(places: Places, steps: list[Step]) -> Remark:
     )
     after = rows.line[min(step.at for step in steps) :]
     done = (
-        "The step is in the model as frame-shift; nothing is excluded for it"
-        if len(steps) == 1
-        else "The parts between the steps have frames of their own; nothing is excluded for it"
+        "The parts between the steps have frames of their own; nothing is excluded for it"
+        if parted
+        else "The step is in the model as frame-shift; nothing is excluded for it"
     )
     return Remark(
         "station-moved",
@@ -142,6 +148,12 @@ def _remark(places: Places, steps: list[Step]) -> Remark:
         True,
         run.source,
     )
+
+
+def _set_up_anew(places: Places, step: Step) -> bool:
+    """Whether a station stands so far from where it stood that it was not pushed but set up."""
+    turn = float(np.linalg.norm(logarithm(step.before[0].T @ step.after[0])))
+    return turn > FAR_RAD or _size(places, step) > FAR_MM
 
 
 def _size(places: Places, step: Step) -> float:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from calib.arrays import Array
+from calib.look.order import order_of_rows
 from calib.mechanism.description import Machine
 from calib.runs.record import Run
 from calib.runs.remark import Remark, ranges
@@ -18,7 +19,7 @@ LEAST_SORTED = 12
 def pose_labels(machine: Machine, run: Run) -> tuple[Run, list[Remark]]:
     """Make two poses of a label that stands for two; say if rows were sorted by their labels."""
     run, shared = _shared(machine, run)
-    return run, [*shared, *_sorted_rows(run)]
+    return run, [*shared, *(_sorted_rows(run) or order_of_rows(run))]
 
 
 def shared_labels(machine: Machine, run: Run) -> dict[str, int]:

@@ -5,13 +5,22 @@ V = A A^T - A J^T C J A^T and the scores s = A e; freeing them lowers chi-square
 priors together by s^T V^-1 s. All moments are tried: sums over the readings from one on.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib.arrays import Array
+from calib.effects import effect_named
+from calib.errors import BadInput
 from calib.identify.fitting import Fit
+from calib.identify.staged import fit_effects
+from calib.identify.starting import aligned
+from calib.mechanism.description import Machine
 from calib.mechanism.rigid import rotate
+from calib.model.prediction import Model
+from calib.runs.record import Run
+from calib.runs.stack import stack
 from calib.scaled import Scaled, normal_matrix
 
 
@@ -37,14 +46,48 @@ def with_the_excluded(fitted: Fit) -> Fit:
     covariance = Scaled.of(normal_matrix(flat, precision)).inverse()
     slope = flat @ whitened[:, accepted].reshape(-1)
     slope -= precision * fitted.model.deviation(fitted.linear.state)
-    left = whitened - np.tensordot(covariance @ slope, jacobian, axes=1)
+    step = covariance @ slope
+    left = whitened - np.tensordot(step, jacobian, axes=1)
+    here = fitted.linear.state
+    there = replace(fitted.model.moved(here, step), near=here.near)
     return replace(
         fitted,
-        linear=replace(fitted.linear, whitened=left),
+        linear=replace(fitted.linear, state=there, whitened=left),
         accepted=accepted,
         bad=(),
         step_covariance=covariance,
     )
+
+
+def fit_of(machine: Machine, run: Run, known: Mapping[str, Array] | None = None) -> Fit | None:
+    """Fit a run alone, with the effects that its record shows; None where that cannot be done."""
+    return fit_together(machine, [run], known)
+
+
+def fit_together(
+    machine: Machine, runs: Sequence[Run], known: Mapping[str, Array] | None = None
+) -> Fit | None:
+    """The same of several runs, or parts of one, each with its own frame."""
+    try:
+        rows = replace(stack(machine, runs), known=known or {})
+        return fit_effects(rows, [effect_named(name, machine) for name in rows.known])
+    except BadInput:
+        return None  # the fit that was asked for says it
+
+
+def from_nominal(machine: Machine, runs: Sequence[Run]) -> Fit | None:
+    """The fit of all readings to first order from the nominal machine: nothing has bent it.
+
+    Where a mistake is large, an optimum is bent by it, and has left out what it could not bend to.
+    """
+    try:
+        model = Model(stack(machine, runs))
+        _, linear = aligned(model, model.base_points(), np.ones(model.rows.count, dtype=bool))
+    except BadInput:
+        return None
+    size = linear.jacobian.shape[0]
+    begun = Fit(model, linear, model.usable, (), np.zeros((size, size)), 0, ())
+    return with_the_excluded(begun)
 
 
 @dataclass(frozen=True, eq=False)

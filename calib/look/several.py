@@ -10,7 +10,7 @@ from calib.errors import BadInput
 from calib.identify.fitting import Fit
 from calib.identify.staged import fit_effects
 from calib.look.reflector import other_reflector
-from calib.look.scan import excess, with_the_excluded
+from calib.look.scan import excess, fit_together, from_nominal, with_the_excluded
 from calib.look.steps import frame_step
 from calib.mechanism.description import Machine
 from calib.runs.record import Run
@@ -18,6 +18,8 @@ from calib.runs.remark import Remark, ranges
 from calib.runs.stack import stack
 
 MOST_STEPS = 4
+SHARE_OF_SEVERAL = 0.3
+"""Least part of a misfit that one of several steps must explain."""
 LEFT = 1.3
 """Chi-square per degree of freedom up to which one step is the whole story."""
 LOUD = 2.0
@@ -44,7 +46,7 @@ def beyond_one_step(machine: Machine, run: Run, stepped: Fit) -> tuple[list[Run]
 def _reflector(machine: Machine, run: Run, stepped: Fit) -> tuple[list[Run], Remark] | None:
     said: Remark | None = None
     meant = run
-    fitted = _fit(machine, [run])
+    fitted = fit_together(machine, [run])
     for _ in range(PASSES):
         if fitted is None:
             return None
@@ -53,12 +55,34 @@ def _reflector(machine: Machine, run: Run, stepped: Fit) -> tuple[list[Run], Rem
             break
         said = said or found.remark
         meant = found.run
-        fitted = _fit(machine, [meant])
+        fitted = fit_together(machine, [meant])
     if said is None or fitted is None or excess(fitted) > excess(stepped) - 6.0:
         return None
     if len(fitted.bad) > len(stepped.bad):
         return None
     return [meant], said
+
+
+def parted(machine: Machine, run: Run) -> tuple[list[Run], Remark] | None:
+    """The run in parts, the steps found one by one from the nominal machine; None for one part.
+
+    Where there are several steps, an optimum with one of them is bent by the others.
+    """
+    edges: list[int] = []
+    parts = [run]
+    while len(edges) < MOST_STEPS:
+        view = from_nominal(machine, parts)
+        if view is None:
+            return None
+        found = frame_step(view, SHARE_OF_SEVERAL)
+        if found is None or found.row in edges:
+            break
+        edges = sorted([*edges, found.row])
+        parts = _split(run, edges)
+    whole, fitted = from_nominal(machine, [run]), fit_together(machine, parts)
+    if len(edges) < 2 or fitted is None or whole is None:
+        return None
+    return parts, _parts_remark(run, whole, edges, fitted)
 
 
 def _parts(machine: Machine, run: Run, stepped: Fit) -> tuple[list[Run], Remark] | None:
@@ -70,7 +94,7 @@ def _parts(machine: Machine, run: Run, stepped: Fit) -> tuple[list[Run], Remark]
     parts = [run]
     while len(edges) < MOST_STEPS:
         parts = _split(run, edges)
-        again = _fit(machine, parts)
+        again = fit_together(machine, parts)
         if again is None:
             return None
         fitted = with_the_excluded(again)
@@ -82,17 +106,20 @@ def _parts(machine: Machine, run: Run, stepped: Fit) -> tuple[list[Run], Remark]
         edges = sorted([*edges, found.row])
     if len(edges) < 2 or fitted.chi2_per_dof > LOUD:
         return None
-    lines = [int(rows.line[edge]) for edge in edges]
+    return parts, _parts_remark(run, stepped, edges, fitted)
+
+
+def _parts_remark(run: Run, stepped: Fit, edges: list[int], fitted: Fit) -> Remark:
+    rows = stepped.model.rows
     told = " and ".join(
-        f"before line {line} ({rows.time_s[edge]:.0f} s)"
-        for line, edge in zip(lines, edges, strict=True)
+        f"before line {rows.line[edge]} ({rows.time_s[edge]:.0f} s)" for edge in edges
     )
-    return parts, Remark(
+    return Remark(
         "station-moved",
         f"The tracker or the base was moved during the run, {told}",
         ranges(rows.line[edges[0] :], rows.line),
         f"With {len(edges) + 1} frames chi-square per degree of freedom is "
-        f"{fitted.chi2_per_dof:.3g}, with two it is {stepped.chi2_per_dof:.3g}",
+        f"{fitted.chi2_per_dof:.3g}, with fewer it is {stepped.chi2_per_dof:.3g}",
         "The parts between the steps have frames of their own; nothing is excluded for it",
         "Nothing, or begin a new run after each move; fasten what was moved",
         True,
@@ -109,13 +136,6 @@ def _split(run: Run, edges: list[int]) -> list[Run]:
         measured[read[first:last]] = True
         parts.append(replace(run, measured=measured))
     return parts
-
-
-def _fit(machine: Machine, runs: list[Run]) -> Fit | None:
-    try:
-        return fit_effects(stack(machine, runs), [])
-    except BadInput:
-        return None
 
 
 def stepped_fit(machine: Machine, run: Run, values: np.ndarray) -> Fit | None:

@@ -7,6 +7,7 @@ import numpy as np
 from calib.arrays import Array
 from calib.effects.tracker import rigid_motions
 from calib.identify.fitting import Fit
+from calib.look.gravity import weight_fall
 from calib.look.scan import excess, scan, whitened, with_the_excluded
 from calib.mechanism.rigid import rotate
 from calib.runs.remark import Remark, ranges
@@ -32,8 +33,11 @@ class FrameStep:
     """Whether the nests on the platform, moved as one, would explain it as well."""
 
 
-def frame_step(fitted: Fit) -> FrameStep | None:
-    """A step of the base that explains most of the misfit, better than anything else that steps."""
+def frame_step(fitted: Fit, share: float = SHARE) -> FrameStep | None:
+    """A step of the base that explains most of the misfit, better than anything else that steps.
+
+    ``share``: least part of the misfit, where several steps share it.
+    """
     situation, rows = fitted.linear.situation, fitted.model.rows
     kept = np.flatnonzero(fitted.accepted)
     inner = slice(LEAST, kept.size - LEAST + 1)
@@ -43,7 +47,7 @@ def frame_step(fitted: Fit) -> FrameStep | None:
         return None
     at = int(np.argmax(fall)) + LEAST
     best = float(base.fall[at])
-    if best < max(FALL, SHARE * excess(fitted)):
+    if best < max(FALL, share * excess(fitted)):
         return None
     others = [situation.actuator_columns[[k]] for k in range(len(rows.machine.actuators))]
     tool = rigid_motions(rows.nest) * rows.on_platform
@@ -53,7 +57,7 @@ def frame_step(fitted: Fit) -> FrameStep | None:
     by_tool = float(rivals.pop())
     drift = rigid_motions(situation.point) * rows.progress
     slow = np.einsum("ijn,kjn->kin", situation.whitener, drift)[:, :, fitted.accepted]
-    rivals.append(scan(fitted, slow).fall[0])
+    rivals += [scan(fitted, slow).fall[0], weight_fall(fitted)]
     if best < max(max(rivals) + CLEAR, by_tool - CLEAR):
         return None
     before, row = _edge(fitted, int(kept[at - 1]), int(kept[at]))

@@ -8,7 +8,10 @@ from calib.arrays import Array, BoolArray
 from calib.runs.record import Run
 from calib.runs.remark import Remark, lines_in_words, ranges
 
-SENTINELS = (-127.0, 85.0, 999.0, -999.0, 9999.0, -9999.0, 999.9, -999.9, -273.15, 32767.0)
+SENTINELS = (
+    -127.0, 85.0, 999.0, -999.0, 9999.0, -9999.0, 999.9, -999.9, -273.15, 32767.0, 3276.7, 327.67,
+    65535.0, 6553.5, 655.35, -32768.0, -3276.8, -327.68, 850.0, -200.0,
+)  # fmt: skip
 """What sensors and converters send instead of a temperature, exactly; deg C."""
 ROOM = (-40.0, 60.0)
 """Temperatures, deg C, at which a machine is measured."""
@@ -63,7 +66,7 @@ def temperatures(run: Run) -> tuple[Run, list[Remark]]:
         if not name.endswith("_C"):
             continue
         values = np.array(channels[name])
-        for look in (_unit, _none_at_all, _sentinels, _no_room, _jumped, _stuck):
+        for look in (_counted, _unit, _none_at_all, _sentinels, _no_room, _jumped, _stuck):
             values, remark = look(run, name, values)
             if remark is not None:
                 remarks.append(remark)
@@ -100,6 +103,24 @@ def _unit(run: Run, name: str, values: Array) -> tuple[Array, Remark | None]:
             run.source,
         )
     return values, None
+
+
+def _counted(run: Run, name: str, values: Array) -> tuple[Array, Remark | None]:
+    """A column that goes on by one number from row to row: it was filled down."""
+    finite = values[np.isfinite(values)]
+    steps = np.diff(finite)
+    if finite.size < 2 * SIDE or steps[0] == 0.0 or np.ptp(steps) > 1e-9 * abs(steps[0]):
+        return values, None
+    return np.full_like(values, np.nan), Remark(
+        "no-temperature",
+        f"{name} goes on by {steps[0]:g} from row to row: it was filled down, not measured",
+        (),
+        "The steps from row to row are equal to the last digit",
+        "Left empty",
+        "Leave the column empty where there is no value; see the sensor",
+        True,
+        run.source,
+    )
 
 
 def _whole(values: Array) -> bool:
