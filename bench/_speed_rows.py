@@ -169,6 +169,7 @@ def identifications() -> Iterator[Row]:
 def asked(words: list[str], compiled: bool, repeats: int = 1) -> tuple[float, float]:
     """CPU seconds and MB of ``python`` with words: the least of some."""
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # an installed program is compiled once
     if not compiled:
         environment["PKMCAL_COMPILED"] = "off"
     found = []

@@ -50,6 +50,11 @@ class RunStage:
         """What is missing from the model."""
         return self.run.diagnosis
 
+    def release(self) -> None:
+        """Hold no columns nor null draws of what was asked: another stage needs the room."""
+        if "run" in self.__dict__:
+            self.run.diagnosis.scores.release()
+
     @property
     def doubtful(self) -> frozenset[str]:
         """Effects whose estimates are not far from nothing for their uncertainty (Wald's test)."""
@@ -103,6 +108,8 @@ class Refitter:
         if names not in self._stages:
             if self._watch is not None:
                 self._watch(names)
+            for stage in self._stages.values():
+                stage.release()
             try:
                 fitted = self.fit(names)
             except BadInput:

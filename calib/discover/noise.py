@@ -53,6 +53,7 @@ def judge(fit: Fit, catalogue: Sequence[Effect], seed: int) -> RunDiagnosis:
         if not found.components:
             return answer
         noisy = with_noise(fit, found.noise)
+        answer.diagnosis.scores.release()
         answer = diagnose_fit(noisy, catalogue, np.random.default_rng(seed))
         answer = replace(answer, noise=found, inflation=inflation(fit, noisy))
         still = {one.name for one in answer.diagnosis.joined}

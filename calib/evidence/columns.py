@@ -7,7 +7,7 @@ but for one trial, which is the least. Products are the same in blocks and at on
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,11 +33,14 @@ class Columns:
         Makes those of successive trials.
     there : bool
         Whether they are held already.
+    recipe : Columns, optional
+        Of those that are held: how they were made.
     """
 
     shape: tuple[int, int, int]
     make: Make
     there: bool = False
+    recipe: "Columns | None" = None
 
     @classmethod
     def of(cls, array: Array) -> "Columns":
@@ -66,6 +69,10 @@ class Columns:
         """The same with every block (t, k, R) changed by ``how``, when it is made."""
         return Columns(self.shape, lambda first, last: how(self.make(first, last)))
 
+    def released(self) -> "Columns":
+        """The same, held no longer; made anew when asked for."""
+        return self.recipe or self
+
     def _made(self, first: int, last: int) -> Array:
         made = self.make(first, last)
         if not np.isfinite(made).all():
@@ -87,4 +94,4 @@ class Room:
         array = np.empty(columns.shape)
         for part, made in columns.blocks():
             array[part] = made
-        return Columns.of(array)
+        return replace(Columns.of(array), recipe=columns)

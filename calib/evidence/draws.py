@@ -46,14 +46,10 @@ class _Noise:
             rng.standard_normal((part.stop - part.start, draws))  # the generator goes on
         return cls(rows, draws, own, live, None)
 
-    def some(self, first: int, last: int) -> Array:
-        """Draws first..last - 1, (R, last - first)."""
-        if self.array is not None:
-            return self.array[:, first:last]
-        found = np.empty((self.rows, last - first))
+    def put(self, first: int, last: int, where: Array) -> None:
+        """Put draws first..last - 1 into ``where`` (R, last - first)."""
         for part, drawn in self._drawn():
-            found[part] = drawn[:, first:last]
-        return found
+            where[part] = drawn[:, first:last]
 
     def times(self, columns: Array) -> Array:
         """Columns (m, R) times all of them, (m, draws)."""
@@ -100,17 +96,23 @@ class Residuals:
             for first in range(0, noise.draws, each):
                 last = min(first + each, noise.draws)
                 which = slice(at + first, at + last)
-                found = noise.some(first, last)
-                for rows, pulls in self._taken:
-                    off = rows.T @ pulls[:, which]
-                    found = np.subtract(found, off, out=off)
+                found = np.empty((noise.rows, before.shape[1] + last - first))
+                found[:, : before.shape[1]] = before
+                drawn = found[:, before.shape[1] :]
+                noise.put(first, last, drawn)
+                self._take_off(which, drawn)
                 if before.size:
-                    which, found = slice(0, which.stop), np.concatenate([before, found], axis=1)
-                    before = before[:, :0]
+                    which, before = slice(0, which.stop), before[:, :0]
                 yield which, found
             at += noise.draws
         if before.size:
             yield slice(0, 1), before
+
+    def _take_off(self, which: slice, drawn: Array) -> None:
+        """What was taken off some draws (R, d), in place, a part of the rows at a time."""
+        for part in _parts(*drawn.shape):
+            for rows, pulls in self._taken:
+                drawn[part] -= rows[:, part].T @ pulls[:, which]
 
     def by_draw(self, ask: Callable[[Array], Array]) -> Array:
         """What ``ask`` answers, (..., d), of residuals (R, d), over all draws (..., 1 + draws)."""
@@ -138,6 +140,10 @@ class Residuals:
                 wide[:, first : first + one.count - 1] = pulls[:, 1:]
                 taken.append((rows, wide))
         return Residuals(self.observed, (*self._noises, *other._noises), tuple(taken))
+
+    def released(self) -> "Residuals":
+        """The same, its noise drawn anew whenever it is asked for."""
+        return replace(self, _noises=tuple(replace(one, array=None) for one in self._noises))
 
     def array(self) -> Array:
         """All at once, (R, 1 + draws)."""

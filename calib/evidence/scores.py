@@ -99,6 +99,16 @@ class Scores(Scored):
             Weighed(self.candidates, self.norms, weights),
         )
 
+    def release(self) -> None:
+        """Hold no more than numbers: columns and null draws are made anew if they are asked for."""
+        self.weighed = Weighed(
+            [replace(one, columns=one.columns.released()) for one in self.candidates],
+            self.norms,
+            self.weights,
+        )
+        self.residuals = self.residuals.released()
+        self.larger = {}
+
     def with_more(self, draws: int, rng: np.random.Generator) -> "Scores":
         """The same with so many null draws more."""
         more = residuals_of(self.problem, draws, rng)

@@ -122,3 +122,20 @@ def agrees(half, scores):
     for name in ("norms", "scores", "weights"):
         for one, other in zip(getattr(half, name), getattr(scores, name), strict=True):
             assert one == pytest.approx(other, rel=1e-7, abs=1e-8)
+
+
+def test_released_scores_make_anew_what_they_held():
+    lab, rng = Lab(5), np.random.default_rng(5)
+    problem = lab.fitted(lab.one(lab.x**3, 0), rng)
+    lazy = [made_anew(one) for one in lab.effects]
+    scores = score(problem, lazy, rng, 40)
+    assert all(one.columns.there for one in scores.candidates)
+    residuals, signature = scores.residuals.array(), joining(scores, 0)[0]
+    larger = scores.without(*joining(scores, 0), np.random.default_rng(1), 0)
+    scores.release()
+    assert not any(one.columns.there for one in scores.candidates)
+    np.testing.assert_allclose(scores.residuals.array(), residuals, rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(joining(scores, 0)[0], signature)
+    again = scores.without(*joining(scores, 0), np.random.default_rng(1), 0)
+    for one, other in zip(larger.scores, again.scores, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9)
