@@ -9,7 +9,6 @@ import click
 
 from app import answer
 from app.analysis_options import machine_options
-from app.files.machines import closed_machine
 from app.machine_templates import TEMPLATES
 from app.show.completion_words import completion_words
 from calib.errors import BadInput
@@ -55,6 +54,7 @@ def draw(machine_name: str, closure: str, pose: str, out: Path | None) -> None:
     """Draw limbs and joints: into a figure, or from two sides in the terminal."""
     import numpy as np
 
+    from app.files.machines import closed_machine
     from app.show.braille import plain
     from app.show.machine_drawing import draw_figure
     from app.show.machine_sketch import draw_text
@@ -203,6 +203,7 @@ def eds(machine_name: str, closure: str, out: Path | None, force: bool) -> None:
     names it: eds = "NAME_controller.eds" in [controller]. docs/protocols/canopen.md says what
     each object does.
     """
+    from app.files.machines import closed_machine
     from mocks.canopen.make_eds import controller_eds
 
     machine = closed_machine(machine_name, closure)

@@ -26,10 +26,11 @@ from mocks.simulate.run import simulate
 pytestmark = pytest.mark.long
 
 PROFILE = Profile(rise_K=8.0, payload_kg=(0.0, 12.0, 0.0, 12.0))
+# What arms alone have is in tests/effects/test_effects_arms.py.
 CASES = [
     (next(name for name in BODIES if name in effect.machines), effect)
     for effect in effects()
-    if not effect.id.startswith("unknown.") and effect.linear
+    if not effect.id.startswith("unknown.") and effect.linear and set(BODIES) & set(effect.machines)
 ]
 
 

@@ -23,4 +23,4 @@ def test_effects_scanned_at_once_are_scanned_one_by_one(name):
         assert size > 0.0
         np.testing.assert_allclose(one.some(0, len(one.trials)), each, atol=1e-12 * size)
         np.testing.assert_allclose(one.some(1, 3), each[1:3], atol=1e-12 * size)
-    assert scanned == ["actuator-step", "frame-shift", "screw-cyclic"]
+    assert {"actuator-step", "frame-shift", "screw-cyclic"} <= set(scanned)
