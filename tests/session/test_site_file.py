@@ -1,11 +1,13 @@
 """Site files: what is wrong is named with its line and a remedy; a good one goes round."""
 
+import asyncio
 from pathlib import Path
 
 import pytest
 from session_mock import site_text
 
 from app.files.site import parse_site
+from app.session.links import open_controller
 from calib.errors import BadInput
 
 
@@ -67,6 +69,9 @@ def test_every_path_of_a_site_holds_from_the_folder_of_a_session(tmp_path: Path)
     assert copied.controller == site.controller
     assert copied.controller.store == str(tmp_path / "s")
     assert str(tmp_path / "a.eds") in str(copied.controller.settings["eds"])
+    with pytest.raises(BadInput, match=rf"no file {tmp_path}/a.eds") as refused:
+        asyncio.run(open_controller(site))
+    assert "[controller] eds" in str(refused.value)
 
 
 EFFECT = """
