@@ -96,13 +96,13 @@ class Lab:
             link.sendall(json.dumps(what).encode() + b"\n")
             assert json.loads(link.makefile().readline())["ok"]
 
-    def session(self, known: set[Path]) -> Journal:
+    def session(self, known: set[Path], meanwhile: Callable[[], None] = lambda: None) -> Journal:
         """The journal of the session that begins now, some readings on."""
         found: list[Path] = []
         root = self.folder / "sessions"
         wait(lambda: found.extend(set(root.glob("2*/journal.sqlite")) - known) or found)
         journal = Journal(found[0], read_only=True)
-        wait(lambda: journal.readings() > 5)
+        wait(lambda: meanwhile() or journal.readings() > 5)
         return journal
 
     def known(self) -> set[Path]:
@@ -119,7 +119,7 @@ def on_screens(lab: Lab, meanwhile: Callable[[Lab, Terminal], None]) -> float:
         terminal.press(CONNECT)
         wait(lambda: terminal.says("firmware"))
         _begin(lab, terminal, known)
-        lab.session(known).close()
+        lab.session(known, _clearing(terminal)).close()
         meanwhile(lab, terminal)
         lab.tap.stopped = 0.0
         pressed = time.monotonic()
@@ -147,6 +147,19 @@ def _begin(lab: Lab, terminal: Terminal, known: set[Path]) -> None:
             time.sleep(0.05)
         terminal.press(ESCAPE)
     raise TimeoutError("no run began")
+
+
+def _clearing(terminal: Terminal) -> Callable[[], None]:
+    """Answers once for the program that was killed in the last state: its drives miss it."""
+    answered: list[bool] = []
+
+    def answer() -> None:
+        if not answered and terminal.says("stands from before"):
+            answered.append(True)
+            time.sleep(0.5)
+            terminal.press(b"c")
+
+    return answer
 
 
 def without_screens(lab: Lab) -> float:
