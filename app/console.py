@@ -3,11 +3,12 @@
 import asyncio
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import Any
+from typing import IO, Any, TextIO, cast
 
 import click
 from rich.console import Console
@@ -23,6 +24,39 @@ from app.show.spans import duration
 STOPS = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
+class Lasting:
+    """A stream that goes on when its terminal is gone: what is written then is lost.
+
+    A write can meet the closed terminal before its signal is heard; the stop that the signal asks
+    for must not end in that write.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        """Write, or lose it."""
+        try:
+            return self._stream.write(text)
+        except OSError:
+            self._leave()
+            return len(text)
+
+    def flush(self) -> None:
+        """Bring it out, or lose it."""
+        try:
+            self._stream.flush()
+        except OSError:
+            self._leave()
+
+    def _leave(self) -> None:
+        with suppress(OSError):
+            _write_to_nobody([self._stream.fileno()])
+
+
 class ConsoleFace:
     """Watches a session's events and talks to the person at the terminal."""
 
@@ -30,7 +64,8 @@ class ConsoleFace:
         self._answer = answer
         self._often = False
         """Whether the step in work is of a kind that is too frequent to tell each end."""
-        self._console = Console(stderr=True, quiet=quiet, highlight=False, soft_wrap=True)
+        lasting = cast(IO[str], Lasting(sys.stderr))
+        self._console = Console(file=lasting, quiet=quiet, highlight=False, soft_wrap=True)
         self._progress = Progress(
             TextColumn("{task.completed:.0f} of {task.total:.0f}"),
             BarColumn(bar_width=24),
