@@ -6,12 +6,12 @@ between a nest of the platform and one of the base. Its zero is its own business
 """
 
 import asyncio
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
 from mocks.clock import ScaledClock
+from mocks.listening import TcpDevice
 from mocks.world import World
 
 LAG_S = 0.15
@@ -122,31 +122,12 @@ class GaugeMock:
         return {"gauge": {**common, **own}, "planes": {"plate": plate}}
 
 
-class GaugeServer:
+class GaugeServer(TcpDevice):
     """The gauge's line at ``host:port`` (port 0: any free one); it answers ``?``."""
 
     def __init__(self, gauge: GaugeMock, host: str = "127.0.0.1", port: int = 0) -> None:
         self.gauge = gauge
-        self._host, self._port = host, port
-        self._server: asyncio.Server | None = None
-        self._clients: set[asyncio.StreamWriter] = set()
-
-    @property
-    def address(self) -> str:
-        """``host:port``."""
-        return f"{self._host}:{self._port}"
-
-    async def start(self) -> None:
-        """Listen."""
-        self._server = await asyncio.start_server(self._serve, self._host, self._port)
-        self._port = self._server.sockets[0].getsockname()[1]
-
-    async def stop(self) -> None:
-        """Close everything."""
-        if self._server is not None:
-            self._server.close()
-        for client in tuple(self._clients):
-            client.transport.abort()
+        super().__init__(host, port)
 
     def site(self) -> dict[str, Any]:
         """The tables of a site file."""
@@ -154,14 +135,9 @@ class GaugeServer:
         link = {"kind": "lines", "source": self.address, "unit": "mm", "ask": "?\\n"}
         return {**tables, "gauge": {**link, "silence_s": 2.0, **tables["gauge"]}}
 
-    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._clients.add(writer)
-        try:
-            with suppress(OSError, ValueError):
-                while line := await reader.readline():
-                    if line.strip() == b"?" and (said := self.gauge.line()) is not None:
-                        writer.write(said.encode("latin-1") + b"\r\n")
-                        await writer.drain()
-        finally:
-            self._clients.discard(writer)
-            writer.close()
+    async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Answer, or speak, as the device does."""
+        while line := await reader.readline():
+            if line.strip() == b"?" and (said := self.gauge.line()) is not None:
+                writer.write(said.encode("latin-1") + b"\r\n")
+                await writer.drain()

@@ -6,13 +6,14 @@ The moment is searched between the stops of the machine. Several runs stand one 
 the clock of t0; homing before the next one brings the actuator back.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from calib.arrays import Array
-from calib.effects.component import Effect, Scan, Signature, Situation, alone, per_actuator
-from calib.effects.run_clock import about, between, from_then_on, run_starts, spread
+from calib.effects.component import Scan, Signature, Situation, alone, per_actuator
+from calib.effects.one_step import OneStep
+from calib.effects.run_clock import between, from_then_on, run_starts
 from calib.runs.stack import Rows
 from calib.unknown import Unknown
 
@@ -20,43 +21,39 @@ EDGE = 0.06
 """Part of the stops at either end in which a step cannot be told from bad readings."""
 
 
-class ActuatorStep(Effect):
+class ActuatorStep(OneStep):
     """A step for each actuator, alone or with others, all at one moment ``t0``."""
 
     id = "actuator-step"
     kind = "machine"
     says = "a leg or drive is off from some moment on: it lost counts or its index, or slipped"
     depends = ("run", "time_s")
-    ends_with_run = True
 
     def unavailable(self, rows: Rows) -> str:
         """Time must pass between stops."""
-        return "" if _every_moment(rows).size else "too few readings at different times"
+        return "" if self.moments(rows).size else "too few readings at different times"
+
+    def moments(self, rows: Rows) -> Array:
+        """Moments between successive stops with a reading, away from the ends of each run."""
+        found = []
+        for run, start in enumerate(run_starts(rows)):
+            here = (rows.run == run) & rows.on_platform
+            stops, first = np.unique(rows.path.stop[rows.at[here]], return_index=True)
+            times = np.sort(rows.time_s[here][first])
+            found.append(start + between(times, max(2, int(EDGE * stops.size))))
+        return np.concatenate(found)
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``actuator-step.leg1`` .., mm or rad; ``.t0`` in s."""
-        moments = _every_moment(rows)
-        gap = float(np.median(np.diff(moments))) if moments.size > 1 else 1.0
         steps = (
             Unknown(f"actuator-step.{axis.name}", axis.unit, axis.lost_motion)
             for axis in rows.machine.axes
         )
-        return (*steps, Unknown("actuator-step.t0", "s", gap, sigma=0.5 * gap, nonlinear=True))
+        return (*steps, self.t0(rows))
 
     def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
         """Each actuator alone."""
         return alone(len(rows.machine.actuators))
-
-    def trials(self, rows: Rows) -> Iterator[tuple[float, ...]]:
-        """Moments over all runs."""
-        for moment in spread(_every_moment(rows)):
-            yield (float(moment),)
-
-    def refined(self, rows: Rows, trial: tuple[float, ...]) -> Iterator[tuple[float, ...]]:
-        """Every moment between the neighbouring ones that were tried."""
-        every = _every_moment(rows)
-        for moment in about(spread(every), every, trial[0]):
-            yield (float(moment),)
 
     def scan(self, situation: Situation, trials: Sequence[tuple[float, ...]]) -> Scan | None:
         """One from every moment on."""
@@ -73,17 +70,6 @@ class ActuatorStep(Effect):
         after = from_then_on(rows, rows.time_s, float(values[-1]))
         steps = per_actuator(np.tile(after.astype(np.float64), (len(rows.machine.actuators), 1)))
         return Signature(extension=np.concatenate([steps, np.zeros_like(steps[:1])]))
-
-
-def _every_moment(rows: Rows) -> Array:
-    """Moments between successive stops with a reading, away from the ends of each run."""
-    found = []
-    for run, start in enumerate(run_starts(rows)):
-        here = (rows.run == run) & rows.on_platform
-        stops, first = np.unique(rows.path.stop[rows.at[here]], return_index=True)
-        times = np.sort(rows.time_s[here][first])
-        found.append(start + between(times, max(2, int(EDGE * stops.size))))
-    return np.concatenate(found)
 
 
 EFFECTS = (ActuatorStep(),)

@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable
 from drivers.errors import LinkError, Refused
 from drivers.interface import Alarm, GaugeCan, GaugeReading, GaugeState, Identity
 from drivers.lines.number import UNITS
+from drivers.operator.asked import unless_stopped
 
 AskNumber = Callable[[str, str], Awaitable[str]]
 """Brings a question to the person: what was wrong before (or nothing), and what is to be typed."""
@@ -70,16 +71,9 @@ class PersonReads:
         return value if abs(value) < 1e9 else None
 
     async def _answer(self, ask: AskNumber, wrong: str) -> str:
-        asking = asyncio.ensure_future(ask(wrong, f"the number in {self._unit}"))
-        stopping = asyncio.ensure_future(self._stopped.wait())
-        try:
-            await asyncio.wait([asking, stopping], return_when=asyncio.FIRST_COMPLETED)
-            if asking.done():
-                return asking.result()
-        finally:
-            asking.cancel()
-            stopping.cancel()
-            await asyncio.gather(asking, stopping, return_exceptions=True)
+        said = await unless_stopped(ask(wrong, f"the number in {self._unit}"), self._stopped)
+        if said is not None:
+            return said
         raise LinkError("stopped by the operator", device=self.identity.product)
 
     async def stop(self) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from drivers.errors import LinkLost, Refused
 from drivers.interface import ActuatorState, Alarm, ControllerCan, ControllerState, Identity
 from drivers.kind import ActuatorFacts
+from drivers.operator.asked import unless_stopped
 
 Ask = Callable[[str, tuple[str, ...], str], Awaitable[str]]
 """Brings a question to the person: its text, the answers to choose from, and what may be typed."""
@@ -169,16 +170,9 @@ class PersonMoves:
         """The person's answer; raises Refused if a stop comes before it."""
         text = f"{before}Move the machine to {self._wanted()}."
         typed = f"the values reached: {' '.join(one.name for one in self._actuators)}"
-        asking = asyncio.ensure_future(ask(text, (DONE, CANNOT), typed))
-        stopping = asyncio.ensure_future(self._stopped.wait())
-        try:
-            await asyncio.wait([asking, stopping], return_when=asyncio.FIRST_COMPLETED)
-            if asking.done():
-                return asking.result()
-        finally:
-            asking.cancel()
-            stopping.cancel()
-            await asyncio.gather(asking, stopping, return_exceptions=True)
+        said = await unless_stopped(ask(text, (DONE, CANNOT), typed), self._stopped)
+        if said is not None:
+            return said
         raise Refused("the move was stopped", device=self.identity.kind, remedy="Command it again")
 
     def _wanted(self) -> str:

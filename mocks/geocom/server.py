@@ -2,17 +2,17 @@
 
 import asyncio
 import re
-from contextlib import suppress
 
 from mocks.clock import ScaledClock
 from mocks.geocom.instrument import TotalStationMock
+from mocks.listening import TcpDevice
 from mocks.world import World
 
 _REQUEST = re.compile(r"%R1Q,(\d+)(?:,(\d+))?(?:,\d+)?:(.*)")
 NOT_DECODED, UNAVAILABLE, WRONG_VALUES = 3080, 3081, 3078
 
 
-class GeoComServer:
+class GeoComServer(TcpDevice):
     """A total station at ``host:port`` (port 0: any free one); one client after the other."""
 
     def __init__(
@@ -20,40 +20,21 @@ class GeoComServer:
     ) -> None:
         self._world, self._clock = world, clock
         self.instrument = TotalStationMock(world, clock)
-        self._host, self._port = host, port
-        self._server: asyncio.Server | None = None
-        self._clients: set[asyncio.StreamWriter] = set()
+        super().__init__(host, port)
 
     @property
     def address(self) -> str:
         """``socket://host:port``, as pyserial names it."""
-        return f"socket://{self._host}:{self._port}"
+        return f"socket://{super().address}"
 
-    async def start(self) -> None:
-        """Listen."""
-        self._server = await asyncio.start_server(self._serve, self._host, self._port)
-        self._port = self._server.sockets[0].getsockname()[1]
-
-    async def stop(self) -> None:
-        """Close everything."""
-        if self._server is not None:
-            self._server.close()
-        for client in self._clients:
-            client.transport.abort()
-
-    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._clients.add(writer)
-        try:
-            with suppress(OSError, ValueError):
-                while line := await reader.readline():
-                    text = line.decode("latin-1").strip()
-                    if not text or "tracker-silent" in self._world.faults:
-                        continue
-                    writer.write((await self._answer(text) + "\r\n").encode("latin-1"))
-                    await writer.drain()
-        finally:
-            self._clients.discard(writer)
-            writer.close()
+    async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Answer, or speak, as the device does."""
+        while line := await reader.readline():
+            text = line.decode("latin-1").strip()
+            if not text or "tracker-silent" in self._world.faults:
+                continue
+            writer.write((await self._answer(text) + "\r\n").encode("latin-1"))
+            await writer.drain()
 
     async def _answer(self, text: str) -> str:
         request = _REQUEST.fullmatch(text)

@@ -5,11 +5,11 @@ It follows SMR 1 wherever it is carried, has no command, no weather and no secon
 """
 
 import asyncio
-from contextlib import suppress
 
 import numpy as np
 
 from mocks.clock import ScaledClock
+from mocks.listening import TcpDevice
 from mocks.smrs import HAND
 from mocks.tracker.sensor import Sensor
 from mocks.world import World
@@ -18,7 +18,7 @@ LINES_PER_WALL_S = 400.0
 SMR = "smr1"
 
 
-class LineServer:
+class LineServer(TcpDevice):
     """Sends lines to every client of ``host:port`` (port 0: any free one)."""
 
     def __init__(
@@ -26,39 +26,15 @@ class LineServer:
     ) -> None:
         self._world, self._clock = world, clock
         self._sensor = Sensor(world)
-        self._host, self._port = host, port
-        self._server: asyncio.Server | None = None
-        self._clients: set[asyncio.StreamWriter] = set()
+        super().__init__(host, port)
 
-    @property
-    def address(self) -> str:
-        """``host:port``."""
-        return f"{self._host}:{self._port}"
-
-    async def start(self) -> None:
-        """Listen."""
-        self._server = await asyncio.start_server(self._serve, self._host, self._port)
-        self._port = self._server.sockets[0].getsockname()[1]
-
-    async def stop(self) -> None:
-        """Close everything."""
-        if self._server is not None:
-            self._server.close()
-        for client in self._clients:
-            client.transport.abort()
-
-    async def _serve(self, _reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._clients.add(writer)
-        try:
-            with suppress(OSError):
-                while not writer.is_closing():
-                    await asyncio.sleep(1.0 / LINES_PER_WALL_S)
-                    if "tracker-silent" not in self._world.faults:
-                        writer.write(self.line().encode("ascii"))
-                        await writer.drain()
-        finally:
-            self._clients.discard(writer)
-            writer.close()
+    async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Answer, or speak, as the device does."""
+        while not writer.is_closing():
+            await asyncio.sleep(1.0 / LINES_PER_WALL_S)
+            if "tracker-silent" not in self._world.faults:
+                writer.write(self.line().encode("ascii"))
+                await writer.drain()
 
     def line(self) -> str:
         """What it says now."""

@@ -1,0 +1,39 @@
+"""What is off from one moment of one run on: the moment is searched between readings."""
+
+from abc import abstractmethod
+from collections.abc import Iterator
+
+import numpy as np
+
+from calib.arrays import Array
+from calib.effects.component import Effect
+from calib.effects.run_clock import about, spread
+from calib.runs.stack import Rows
+from calib.unknown import Unknown
+
+
+class OneStep(Effect):
+    """A step at ``t0``, the last and only nonlinear unknown, over before the next run."""
+
+    ends_with_run = True
+
+    @abstractmethod
+    def moments(self, rows: Rows) -> Array:
+        """Every moment (n,) at which it may step, s, on the clock of all runs."""
+
+    def t0(self, rows: Rows) -> Unknown:
+        """The moment, known to half of what lies between two of them."""
+        moments = self.moments(rows)
+        gap = float(np.median(np.diff(moments))) if moments.size > 1 else 1.0
+        return Unknown(f"{self.id}.t0", "s", gap, sigma=0.5 * gap, nonlinear=True)
+
+    def trials(self, rows: Rows) -> Iterator[tuple[float, ...]]:
+        """Moments over all runs."""
+        for moment in spread(self.moments(rows)):
+            yield (float(moment),)
+
+    def refined(self, rows: Rows, trial: tuple[float, ...]) -> Iterator[tuple[float, ...]]:
+        """Every moment between the neighbouring ones that were tried."""
+        every = self.moments(rows)
+        for moment in about(spread(every), every, trial[0]):
+            yield (float(moment),)
