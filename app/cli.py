@@ -11,27 +11,11 @@ import click
 
 from app.errors import GateRefused, StoppedByOperator
 from app.plain_data import printable
+from app.tasks import TASKS
 from calib.errors import BadInput
 from drivers.errors import DeviceError
 
 VERBS = Path(__file__).parent / "verbs"
-
-# The order in which an operator works; it is the order of ``pkmcal --help``.
-TASKS = (
-    (
-        "Know the machine",
-        ("machine", "kinematics", "poses", "design", "sensitivity", "identifiability"),
-    ),
-    ("Measure", ("site", "measure", "resume", "attach", "enter", "import")),
-    ("Identify", ("fit", "compare", "predict", "fleet")),
-    ("Find what the model misses", ("diagnose", "discover")),
-    (
-        "Correct and prove it",
-        ("auto", "apply", "undo", "correct", "export", "verify", "iso9283", "report"),
-    ),
-    ("Look back", ("sessions", "log", "history")),
-    ("Without hardware", ("demo", "mock", "simulate", "reproduce")),
-)
 
 EXIT_BAD_INPUT = 2
 EXIT_DEVICE = 3

@@ -8,7 +8,7 @@ from importlib.metadata import version
 
 import click
 
-from app.cli import TASKS
+from app.tasks import TASKS
 
 FILES = (
     ("sessions/", "where sessions, the history of the machines and what verifications kept lie"),

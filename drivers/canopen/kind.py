@@ -99,15 +99,29 @@ def _address(settings: Mapping[str, Any]) -> str:
     return str(settings["channel"])
 
 
+BUS_SETTINGS = (
+    Setting(
+        "interface", "text", "any interface of python-can", "slcan", check=known_interface
+    ),
+    Setting("channel", "text", 'as the interface calls it: "can0", "socket://host:port", ...'),
+    Setting("bitrate", "whole", "of the bus, bit/s; 0 where the adapter knows it", 0),
+    Setting("can", "table", "further keywords of the interface, as python-can calls them", {}),
+)  # fmt: skip
+"""Any CAN interface, as python-can calls it."""
+
+HEARTBEAT_SETTINGS = (
+    Setting("heartbeat_s", "number", "period of the heartbeats, s", 0.1, least=0.01, most=10.0),
+    Setting(
+        "silence_s", "number", "seconds without heartbeat after which a node is lost", 1.0,
+        least=0.05, most=60.0,
+    ),
+)  # fmt: skip
+"""How nodes watch one another."""
+
 KIND: Kind[MotionController] = Kind(
     says="A kinematic controller with its CiA 402 drives on CANopen, our object dictionary",
     settings=(
-        Setting(
-            "interface", "text", "any interface of python-can", "slcan", check=known_interface
-        ),
-        Setting("channel", "text", 'as the interface calls it: "can0", "socket://host:port", ...'),
-        Setting("bitrate", "whole", "of the bus, bit/s; 0 where the adapter knows it", 0),
-        Setting("can", "table", "further keywords of the interface, as python-can calls them", {}),
+        *BUS_SETTINGS,
         Setting("node", "whole", "node of the controller", 10, least=1, most=127),
         Setting(
             "drive_nodes", "numbers", "nodes of its drives; left out, 1, 2, ...", (),
@@ -118,11 +132,7 @@ KIND: Kind[MotionController] = Kind(
             "left out, the one that ships", (), count="actuators",
         ),
         Setting("eds", "file", "its EDS file; left out, the one that ships for the machine", ""),
-        Setting("heartbeat_s", "number", "period of the heartbeats, s", 0.1, least=0.01, most=10.0),
-        Setting(
-            "silence_s", "number", "seconds without heartbeat after which a node is lost", 1.0,
-            least=0.05, most=60.0,
-        ),
+        *HEARTBEAT_SETTINGS,
     ),
     open=_open,
     address=_address,

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from drivers.canopen.kind import different_nodes, known_interface
+from drivers.canopen.kind import BUS_SETTINGS, HEARTBEAT_SETTINGS, different_nodes
 from drivers.interface import Motors
 from drivers.kind import REQUIRED, Kind, Setting, Surroundings
 
@@ -49,17 +49,8 @@ def _each(
 KIND: Kind[Motors] = Kind(
     says="CiA 402 drives alone on CANopen, each with its maker's EDS; the host computes the legs",
     settings=(
-        Setting(
-            "interface", "text", "any interface of python-can", "slcan", check=known_interface
-        ),
-        Setting("channel", "text", 'as the interface calls it: "can0", "socket://host:port", ...'),
-        Setting("bitrate", "whole", "of the bus, bit/s; 0 where the adapter knows it", 0),
-        Setting("can", "table", "further keywords of the interface, as python-can calls them", {}),
-        Setting("heartbeat_s", "number", "period of the heartbeats, s", 0.1, least=0.01, most=10.0),
-        Setting(
-            "silence_s", "number", "seconds without heartbeat after which a node is lost", 1.0,
-            least=0.05, most=60.0,
-        ),
+        *BUS_SETTINGS,
+        *HEARTBEAT_SETTINGS,
         Setting(
             "eds", "files", "EDS file of the drives: one for all, or one for each actuator",
             count="actuators",
