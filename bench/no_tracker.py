@@ -1,29 +1,32 @@
 """A delta without a laser tracker: heights, calipers on a printed part, and a tracker beside them.
 
-python -m bench no_tracker [--seeds N] [--plain]
+    python -m bench no_tracker [--seeds N] [--page]
 
-Deltas with the errors that the drawing allows (towers lean, the two rods of a pair differ) are
-probed at 30 places of the bed; 12 distances between marks at these places are measured with
-calipers. The same numbers go to the least squares that 3D printers use (bench/_tower_delta.py) and
-to runs of version 2. Judged at 300 fresh poses up to 120 mm above the bed, after the one shift and
-turn in the plane of the bed that no reading can know. ``--plain``: the towers stand upright at one
-radius and rods are equal, so that the printer's model is complete.
+Two worlds of machines: those that the drawing of ``delta`` allows (towers lean, each at a radius
+of its own, the two rods of a pair differ), and those of which ``delta-printer``, what the firmware
+of 3D printers assumes, is the whole truth. Each machine is probed at 30 places of the bed; 12
+distances between marks at these places are measured with calipers; and besides a part that stands
+100 mm high is measured with them across its top and from its foot to its top. The same numbers go
+to the least squares that printers use (bench/_tower_delta.py) and to runs of version 2, fitted with
+either machine file. Judged at 300 fresh poses up to 120 mm above the bed, after the one shift and
+turn in the plane of the bed that no reading can know. ``--page`` writes the tables into
+docs/no-laser-tracker.md.
 """
 
 import argparse
-import re
+from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 
 from app.files.machines import load_machine
 from bench._tower_delta import Measured, calibrate, effector
 from calib.arrays import Array, IntArray
+from calib.discover.agreement import more_than_noise
 from calib.identify import Fit, fit
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
-from calib.mechanism.parse import parse_machine
 from calib.mechanism.rigid import exponential
 from calib.mechanism.solve import forward, inverse
 from calib.model import Model
@@ -34,24 +37,42 @@ from mocks.simulate.kinds import Laboratory, Stand
 
 HEIGHTS, DISTANCES, FRESH = 30, 12, 300
 PROBE_MM, CALIPERS_MM, TRACKER_MM = 0.010, 0.020, 0.010
-BED, REACH = 40.0, 60.0
+BED, TALL, REACH = 40.0, 100.0, 60.0
+PAGE = Path("docs/no-laser-tracker.md")
+
+WORLDS = {
+    "leaning": "towers lean, each at a radius of its own, the rods of a pair differ",
+    "upright": "upright towers at one radius, rods equal in pairs",
+}
+READ = {
+    "heights": "heights",
+    "calipers": "heights + calipers",
+    "part": "the same + a tall part",
+    "tracker": "tracker at the same 30 places",
+}
+PRINTER = "printer's least squares"
+FILES = ("delta-printer", "delta")
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """RMS errors at fresh poses, um: in the plane and in height; and what the fit expected."""
+    """RMS errors at fresh poses, um: in the plane and in height; and what the fit expected.
+
+    ``doubted``: the fit says that more is left than noise; nan where there is no fit.
+    """
 
     plane: float
     height: float
     plane_expected: float = float("nan")
     height_expected: float = float("nan")
+    doubted: float = float("nan")
 
 
-def drawn(machine: Machine, rng: np.random.Generator, *, plain: bool) -> Array:
-    """Parameters (P,) uniform within the tolerances; ``plain``: what a printer's model can say."""
+def drawn(machine: Machine, rng: np.random.Generator, world: str) -> Array:
+    """Parameters (P,) uniform within the tolerances; upright: what a printer's model can say."""
     off = machine.tolerance * rng.uniform(-1.0, 1.0, machine.nominal.size)
     names = [parameter.name for parameter in machine.parameters]
-    for k, name in enumerate(names) if plain else ():
+    for k, name in enumerate(names) if world == "upright" else ():
         tower, _, what = name.partition(".")
         if what.startswith("lean") or (what, tower) == ("azimuth", "tower3"):
             off[k] = 0.0
@@ -62,22 +83,11 @@ def drawn(machine: Machine, rng: np.random.Generator, *, plain: bool) -> Array:
     return np.asarray(machine.nominal + off)
 
 
-def upright() -> Machine:
-    """The delta as a drawing with upright towers and rods that are equal in pairs has it."""
-    text = files("calib.machines").joinpath("delta.toml").read_text(encoding="utf-8")
-    text = text.replace(" ry:lean_in rx:lean_aside", "")
-    text = text.replace("tz:-length_b", "tz:-length_a")
-    text = re.sub(r"^(length_b|lean_in|lean_aside) = .*\n", "", text, flags=re.MULTILINE)
-    text = text.replace('["length_a", "length_b"]', '["length_a"]')
-    text = text.replace('parallelogram = ["length_a"]\n', "")
-    return parse_machine(text, "delta")
-
-
-def probed(machine: Machine) -> Array:
+def probed(machine: Machine, height: float = BED) -> Array:
     """q (3, N) at which a nominal machine stands over the bed: a spiral of Vogel's sunflower."""
     k = np.arange(HEIGHTS)
     radius, angle = REACH * np.sqrt((k + 0.5) / HEIGHTS), k * np.pi * (3.0 - np.sqrt(5.0))
-    task = np.array([radius * np.cos(angle), radius * np.sin(angle), np.full(HEIGHTS, BED)])
+    task = np.array([radius * np.cos(angle), radius * np.sin(angle), np.full(HEIGHTS, height)])
     return machine.coordinates(inverse(machine, task).extension)
 
 
@@ -100,22 +110,31 @@ def laboratory(machine: Machine, real: Array, q: Array, rng: np.random.Generator
     return Laboratory(header, {"tool": np.zeros(3)}, base, 3, rng, {"tracker": frame})
 
 
-def measured(machine: Machine, real: Array, q: Array, seed: int) -> tuple[Measured, dict[str, str]]:
+def measured(machine: Machine, real: Array, seed: int) -> tuple[Measured, dict[str, str]]:
     """Numbers for the printer's least squares; points.csv by what is read, and run.toml."""
-    poses = forward(machine, machine.extension(q), real).poses
+    q, above = probed(machine), probed(machine, BED + TALL)
+    low, high = (forward(machine, machine.extension(one), real).poses for one in (q, above))
     pairs = ends(q)
     texts: dict[str, str] = {}
-    for what in ("heights", "calipers", "tracker"):
+    for what in READ:
         lab = laboratory(machine, real, q, np.random.default_rng(seed))
         for k in range(HEIGHTS):
-            lab.go(f"{k}", q[:, k].tolist(), poses.position[:, k], poses.rotation[:, :, k])
+            lab.go(f"{k}", q[:, k].tolist(), low.position[:, k], low.rotation[:, :, k])
             if what == "tracker":
                 lab.point("tool", TRACKER_MM, by="tracker")
             else:
                 lab.point("tool", PROBE_MM, by="probe", only="z")
-        if what == "calipers":
+        if what in ("calipers", "part"):
             for first, second in pairs.T:
                 lab.marks("tool", f"{first}", f"{second}", CALIPERS_MM, by="calipers")
+        if what == "part":
+            for k in pairs[0]:
+                place, turn = high.position[:, k], high.rotation[:, :, k]
+                lab.go(f"top {k}", above[:, k].tolist(), place, turn)
+                lab.move()
+            for first, second in pairs.T:
+                for one, other in ((f"top {first}", f"top {second}"), (first, f"top {second}")):
+                    lab.marks("tool", f"{one}", other, CALIPERS_MM, by="calipers")
         if what == "tracker":
             for nest in lab.base:
                 lab.point(nest, TRACKER_MM, by="tracker")
@@ -163,62 +182,92 @@ def judged(found: Fit, machine: Machine, fresh: PoseSet, true: Array) -> Judged:
     covariance = found.covariance[: free.size, : free.size]
     flat = without(in_plane(true), moved[:, :2].reshape(free.size, -1))
     expected = [float(np.sum(one * (covariance @ one))) for one in (flat, moved[:, 2])]
-    return Judged(plane, height, *(1000.0 * np.sqrt(np.array(expected) / true.shape[1])))
+    along = 1000.0 * np.sqrt(np.array(expected) / true.shape[1])
+    return Judged(plane, height, *along, float(bool(more_than_noise(found))))
 
 
-def one(machine: Machine, seed: int, q: Array, fresh: PoseSet, *, plain: bool) -> dict[str, Judged]:
-    """One machine, measured and judged in every way."""
-    rng = np.random.default_rng(seed)
-    real = drawn(machine, rng, plain=plain)
+def one(
+    machines: Mapping[str, Machine], world: str, seed: int, fresh: PoseSet
+) -> dict[str, Judged]:
+    """One machine, measured and judged in every way: by method and what was read."""
+    machine = machines["delta"]
+    real = drawn(machine, np.random.default_rng(seed), world)
     true = forward(machine, machine.extension(fresh.q), real).poses.position
-    numbers, texts = measured(machine, real, q, seed)
+    numbers, texts = measured(machine, real, seed)
     found = {"before": Judged(*judge(fresh.poses.position - true, true))}
-    alone = Measured(q, numbers.heights, np.zeros(0), np.zeros((2, 0), dtype=np.intp))
-    for name, data in (("printer, heights", alone), ("printer, + calipers", numbers)):
+    alone = Measured(numbers.q, numbers.heights, np.zeros(0), np.zeros((2, 0), dtype=np.intp))
+    for what, data in (("heights", alone), ("calipers", numbers)):
         off = effector(calibrate(data), fresh.q) - true
-        found[name] = Judged(*judge(off, true))
-    for what, name in (
-        ("heights", "heights"), ("calipers", "heights + calipers"), ("tracker", "tracker"),
-    ):  # fmt: skip
-        run = parse_run(texts["header"], texts[what], actuators=3)
-        found[name] = judged(fit(Model(stack(machine, [run]))), machine, fresh, true)
-    if plain:
-        drawing = upright()
-        run = parse_run(texts["header"], texts["calipers"], actuators=3)
-        name = "the same, upright"
-        found[name] = judged(fit(Model(stack(drawing, [run]))), drawing, fresh, true)
+        found[f"{PRINTER}, {READ[what]}"] = Judged(*judge(off, true))
+    for file in FILES:
+        for what, name in READ.items():
+            run = parse_run(texts["header"], texts[what], actuators=3)
+            model = Model(stack(machines[file], [run]))
+            found[f"`{file}`, {name}"] = judged(fit(model), machines[file], fresh, true)
     return found
+
+
+def table(all_of: list[dict[str, Judged]], world: str) -> list[str]:
+    """Lines of the table of one world: medians over the machines."""
+    lines = [
+        f"| {WORLDS[world]}: um | x, y | z | x, y expected | z expected "
+        "| something is missing, says the fit |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name in all_of[0]:
+        rows = [row[name] for row in all_of]
+        cells = [f"{np.median([row.plane for row in rows]):.1f}"]
+        cells += [f"{np.median([row.height for row in rows]):.1f}"]
+        for column in ("plane_expected", "height_expected"):
+            value = float(np.median([getattr(row, column) for row in rows]))
+            cells += ["" if np.isnan(value) else f"{value:.1f}"]
+        doubted = [row.doubted for row in rows]
+        cells += ["" if np.isnan(doubted[0]) else f"{sum(doubted):.0f} of {len(rows)}"]
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    return lines
+
+
+def paired(all_of: list[dict[str, Judged]], ours: str, theirs: str) -> str:
+    """Cells of a row: differences of two methods on the same machines, with standard errors."""
+    cells = [ours, theirs]
+    for column in ("plane", "height"):
+        apart = np.array([getattr(r[ours], column) - getattr(r[theirs], column) for r in all_of])
+        # Of the median by its asymptotic spread, 1.2533 sigma / sqrt(n).
+        error = 1.2533 * float(np.std(apart, ddof=1)) / np.sqrt(len(apart))
+        cells.append(f"{np.median(apart):+.1f} +- {error:.1f}")
+    return " | ".join(cells)
 
 
 def main() -> None:
     """Print medians over the machines, and the paired differences to the printer's method."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--seeds", type=int, default=50)
-    parser.add_argument("--plain", action="store_true", help="upright towers, equal rods")
+    parser.add_argument("--page", action="store_true", help=f"write the tables into {PAGE}")
     asked = parser.parse_args()
-    seeds = asked.seeds
-    machine = load_machine("delta")
-    q = probed(machine)
-    fresh = sample_poses(machine, FRESH, np.random.default_rng(7))
-    all_of = [one(machine, seed, q, fresh, plain=asked.plain) for seed in range(1, seeds + 1)]
-    print(f"{seeds} deltas, {HEIGHTS} heights, {DISTANCES} distances; medians at fresh poses, um")
-    print(f"{'':22}{'x, y':>8}{'z':>8}{'x, y expected':>15}{'z expected':>12}")
-    for name in all_of[0]:
-        columns = [
-            float(np.median([getattr(row[name], column) for row in all_of]))
-            for column in ("plane", "height", "plane_expected", "height_expected")
-        ]
-        print(f"{name:22}{columns[0]:8.1f}{columns[1]:8.1f}{columns[2]:15.1f}{columns[3]:12.1f}")
-    for ours, theirs in (
-        ("heights", "printer, heights"), ("heights + calipers", "printer, + calipers"),
-        ("the same, upright", "printer, + calipers"),
-    ):  # fmt: skip
-        for column in ("plane", "height") if ours in all_of[0] else ():
-            pairs = [(getattr(r[ours], column), getattr(r[theirs], column)) for r in all_of]
-            apart = np.array([a - b for a, b in pairs])
-            # Of the median by its asymptotic spread, 1.2533 sigma / sqrt(n).
-            error = 1.2533 * float(np.std(apart, ddof=1)) / np.sqrt(len(apart))
-            print(f"{ours} less {theirs}, {column}: {np.median(apart):+.1f} +- {error:.1f}")
+    machines = {name: load_machine(name) for name in FILES}
+    fresh = sample_poses(machines["delta"], FRESH, np.random.default_rng(7))
+    lines, apart = [], ["| world | ours | beside | x, y | z |", "|---|---|---|---|---|"]
+    for world in WORLDS:
+        all_of = [one(machines, world, seed, fresh) for seed in range(1, asked.seeds + 1)]
+        lines += [*table(all_of, world), ""]
+        for file in FILES:
+            for what in ("heights", "calipers"):
+                both = f"`{file}`, {READ[what]}", f"{PRINTER}, {READ[what]}"
+                apart.append(f"| {world} | {paired(all_of, *both)} |")
+    text = "\n".join([*lines, *apart])
+    print(text)
+    if asked.page:
+        write(text)
+
+
+def write(text: str) -> None:
+    """Put the tables between the marks of the page."""
+    whole = PAGE.read_text(encoding="utf-8")
+    before, mark, rest = whole.partition("<!-- no tracker -->")
+    _, end, after = rest.partition("<!-- end -->")
+    if not (mark and end):
+        raise SystemExit(f"{PAGE} has no marks <!-- no tracker --> and <!-- end -->")
+    PAGE.write_text(f"{before}{mark}\n\n{text}\n\n{end}{after}", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -18,6 +18,30 @@ def chi2_above(dof: float, chi2: Array | float) -> Array:
     return np.asarray(special.chdtrc(dof, chi2))
 
 
+def log_chi2_above(dof: float, chi2: float) -> float:
+    """log P(chi-square of ``dof`` > 0 degrees of freedom > chi2), in elementary functions.
+
+    The series of the lower incomplete gamma function below its mean and the continued fraction of
+    the upper one above it (Abramowitz & Stegun 6.5.29, 6.5.31): no scipy, and no underflow.
+    """
+    a, x = 0.5 * dof, 0.5 * chi2
+    if x <= 0.0:
+        return 0.0
+    front = a * math.log(x) - x - math.lgamma(a)
+    if x > a + 1.0:
+        fraction = 0.0
+        for term in range(60 + int(10.0 * math.sqrt(a)), 0, -1):
+            fraction = term * (term - a) / (x + 2.0 * term + 1.0 - a - fraction)
+        return front - math.log(x + 1.0 - a - fraction)
+    total = part = 1.0 / a
+    k = 0
+    while part > 1e-17 * total:
+        k += 1
+        part *= x / (a + k)
+        total += part
+    return math.log1p(-min(math.exp(front) * total, 1.0 - 1e-16))
+
+
 def chi2_below(dof: float, chi2: float) -> float:
     """P(chi-square of ``dof`` degrees of freedom < chi2)."""
     from scipy import special

@@ -1,5 +1,6 @@
 """Fit a model to runs."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +14,12 @@ from app.files.staircase import Way
 from app.jobs.chosen_runs import File, Runs, lines_of, names_of, path_of
 from app.jobs.record import Record, Report
 from app.jobs.remembering import remember_fit
-from calib.discover.agreement import runs_at_odds, successive_alike
+from calib.discover.agreement import (
+    log_chance,
+    more_than_noise,
+    runs_at_odds,
+    successive_alike,
+)
 from calib.identify import Fit, fit_report
 from calib.identify.beyond import beyond_words
 from calib.identify.staged import fit_effects
@@ -89,13 +95,17 @@ class FitReport(Report):
     Errors are RMS of the 3D distance between measured and predicted SMR centre in micrometres;
     a ``floor`` is what a perfect model would show; ``holdout`` is over poses that were not fitted,
     ``platform`` over the same readings as they were fitted. ``by_kind`` has each kind of reading.
-    Where it is not ``settled`` the answer is the best point that its ``steps`` came to.
+    ``p_value``: how often noise alone leaves a chi-square as large; from 0.01 down a remark says
+    that something is missing. Where it is not ``settled`` the answer is the best point that its
+    ``steps`` came to.
     """
 
     FORMAT: ClassVar[str] = "pkm-fit/1"
     effects: tuple[str, ...]
     readings: int
     chi2_per_dof: float | None
+    log10_p: float | None
+    p_value: float | None
     rms_um: float | None
     noise_floor_um: float | None
     holdout_rms_um: float | None
@@ -186,14 +196,17 @@ def fit(
     rows, effects = load_rows(names, tuple(add), path_of(model))
     found = fit_effects(rows, effects, masked_rows(rows, lines_of(mask)))
     remember_fit(found, names)
-    odds = runs_at_odds(found)
+    words = (
+        runs_at_odds(found), successive_alike(found), more_than_noise(found), *beyond_words(found),
+    )  # fmt: skip
+    log_p = log_chance(found)
     said = {
         **fit_report(found),
+        "log10_p": None if log_p is None else log_p / math.log(10.0),
+        "p_value": None if log_p is None else math.exp(log_p),
         "settled": found.settled,
         "steps": found.steps,
-        "remarks": [
-            f"{one}." for one in (odds, successive_alike(found), *beyond_words(found)) if one
-        ],
+        "remarks": [f"{one}." for one in words if one],
         "record": plain_remarks(record_of(found)),
     }
     return FitReport.of(said, _fit=found, _runs=names)

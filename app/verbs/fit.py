@@ -10,6 +10,7 @@ import click
 
 from app import answer
 from app.analysis_options import mask_option, model_options, residuals_option, written_residuals
+from app.show.chances import chance
 from app.show.text_table import text_table
 from calib.digits import Digits, fixed
 
@@ -61,7 +62,8 @@ def words(report: dict[str, Any]) -> str:
         "",
         text_table(("", "RMS", "perfect model"), _qualities(report)),
         *_kinds(report),
-        f"chi-square per degree of freedom {report['chi2_per_dof']:.3f} (1 is perfect)",
+        f"chi-square per degree of freedom {report['chi2_per_dof']:.3f} (1 is perfect), "
+        f"p = {chance(report['log10_p'])}",
         "",
         text_table(
             ("parameter", "value", "+-", "change", "in sigmas", "unit", ""),

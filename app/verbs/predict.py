@@ -10,6 +10,7 @@ import click
 
 from app import answer
 from app.analysis_options import written_residuals
+from app.show.chances import chance
 from app.show.text_table import text_table
 from calib.digits import fixed
 
@@ -58,7 +59,7 @@ def words(report: dict[str, Any]) -> str:
         f"RMS {_um(report['rms_um'])}, expected {_um(report['expected_um'])} (noise alone "
         f"{_um(report['noise_um'])}): ratio {_number(report['ratio'])}",
         f"chi-square per degree of freedom {_number(report['chi2_per_dof'])}, "
-        f"p = {_chance(report['log10_p'])}",
+        f"p = {chance(report['log10_p'])}",
         "",
         text_table(
             ("axis of the base", "mean um", "RMS um", "expected um"),
@@ -106,9 +107,3 @@ def _um(value: float | None) -> str:
 
 def _number(value: float | None) -> str:
     return "-" if value is None else fixed(value, 2)
-
-
-def _chance(log10_p: float | None) -> str:
-    if log10_p is None:
-        return "-"
-    return f"{10**log10_p:.2g}" if log10_p > -300.0 else f"1e{log10_p:.0f}"

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.chance import chi2_above, chi2_below, f_above
+from calib.chance import chi2_above, chi2_below, f_above, log_chi2_above
 from calib.errors import BadInput
 from calib.evidence.repeats import pure_error
 from calib.identify.fitting import Fit
@@ -26,6 +26,8 @@ FEW_PAIRS = 10
 """Pairs of readings below which nothing is said of their likeness."""
 SURELY = 4.5
 """Standard deviations of a correlation that is no chance (3e-6)."""
+DOUBTED = 0.01
+"""Probability of a fit's chi-square by noise alone, below which the fit says that it is doubted."""
 TOO_SMALL, TOO_LARGE = 1.3, 0.7
 """Scatter in stated uncertainties beyond which these are called untrue."""
 
@@ -106,6 +108,24 @@ def successive_alike(fitted: Fit) -> str:
     return (
         f"Successive readings err alike ({alike:.2f} between two): noise that lasts, or an effect "
         "that is missing. The uncertainties take them as independent; pkmcal diagnose tells which"
+    )
+
+
+def log_chance(fitted: Fit) -> float | None:
+    """log of the probability that noise alone leaves as much as the fit; None without freedom."""
+    if not fitted.dof > 0:
+        return None
+    return log_chi2_above(fitted.dof, fitted.chi2)
+
+
+def more_than_noise(fitted: Fit) -> str:
+    """Say if a fit leaves more than the stated uncertainties do by chance; else empty."""
+    log_p = log_chance(fitted)
+    if log_p is None or log_p > math.log(DOUBTED):
+        return ""
+    return (
+        "More is left than noise alone leaves: the machine file or the effects lack something, or "
+        "the readings' uncertainties are stated too small; pkmcal diagnose tells which"
     )
 
 

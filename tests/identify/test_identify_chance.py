@@ -1,5 +1,7 @@
 """Tails of distributions against scipy's own, far out too, and the bound that spares them."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -56,3 +58,15 @@ def test_the_normals_and_poissons_tails_are_scipys() -> None:
         assert chance.poisson_at_least(count, mean) == pytest.approx(
             stats.poisson.sf(count - 1, mean), rel=1e-12
         )
+
+
+@pytest.mark.parametrize("dof", [0.3, 1.0, 7.5, 121.3, 36000.5])
+def test_one_tail_is_scipy_s_and_never_underflows(dof: float) -> None:
+    for sigmas in (-4.0, -1.0, 0.0, 0.5, 1.01, 3.0, 30.0):
+        chi2 = dof + sigmas * math.sqrt(2.0 * dof)
+        if chi2 > 0.0:
+            assert chance.log_chi2_above(dof, chi2) == pytest.approx(
+                stats.chi2.logsf(chi2, dof), rel=1e-8, abs=1e-9
+            )
+    assert chance.log_chi2_above(dof, 1e6) < -3e5
+    assert chance.log_chi2_above(dof, 0.0) == 0.0

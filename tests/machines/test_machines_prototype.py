@@ -33,6 +33,24 @@ def test_a_machine_file_of_ones_own_is_named_from_the_run(tmp_path: Path) -> Non
     assert read_run(out).machine.name == "delta"
 
 
+def test_a_fit_says_that_a_file_takes_too_much_for_granted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Towers that lean, fitted as those of printers: more is left than noise, and it is said."""
+    out = tmp_path / "run"
+    assert run(["simulate", "delta", "--out", str(out), "--poses", "20", "--seed", "1"]) == 0
+    header, said = out / "run.toml", {}
+    for machine in ("delta", "delta-printer"):
+        header.write_text(header.read_text().replace('"delta"', f'"{machine}"'))
+        capsys.readouterr()
+        assert run(["fit", str(out), "--json"]) == 0
+        said[machine] = json.loads(capsys.readouterr().out)
+    assert said["delta"]["p_value"] > 0.01
+    assert not any("More is left" in one for one in said["delta"]["remarks"])
+    assert said["delta-printer"]["log10_p"] < -10.0
+    assert any("More is left" in one for one in said["delta-printer"]["remarks"])
+
+
 def test_hidden_effects_need_a_mock(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = [
         "simulate",

@@ -81,10 +81,10 @@ FIELDS = {
     "hints noise bad_readings unavailable not_on_this_machine advice",
     "DiscoveryReport": "steps effects adequate record indistinguishable unexplained likeness hints "
     "noise bad_readings unavailable parameters refused impossible advice",
-    "FitReport": "effects readings chi2_per_dof rms_um noise_floor_um holdout_rms_um "
-    "holdout_floor_um platform_rms_um platform_floor_um by_kind parameters unidentified "
-    "unidentified_words bad_readings left_out_readings channels_left_aside settled steps remarks "
-    "record",
+    "FitReport": "effects readings chi2_per_dof log10_p p_value rms_um noise_floor_um "
+    "holdout_rms_um holdout_floor_um platform_rms_um platform_floor_um by_kind "
+    "parameters unidentified unidentified_words bad_readings left_out_readings channels_left_aside "
+    "settled steps remarks record",
     "FleetReport": "machine effects parameters machines outliers remarks",
     "FollowUpReport": "machine discriminate model runs conditions right_now right_then poses "
     "advice",
