@@ -2,16 +2,19 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from app.files.models import chosen_effects, offered_effects
 from app.files.runs import LoadedRun, read_runs
-from calib.discover.discovery import Refitter
 from calib.effects import Effect, catalogue, effect_named
 from calib.errors import BadInput
 from calib.look import first_look
 from calib.runs.stack import Rows, stack
+
+if TYPE_CHECKING:
+    from calib.discover.discovery import Refitter
 
 
 def load_rows(
@@ -80,12 +83,14 @@ def load_refitter(
     watch: Callable[[tuple[str, ...]], None] | None = None,
     offer: Sequence[Path] = (),
     mask: Sequence[str] = (),
-) -> tuple[Refitter, tuple[str, ...]]:
+) -> "tuple[Refitter, tuple[str, ...]]":
     """Make runs ready for diagnosis: a refitter over the catalogue, and the effects to begin with.
 
     ``offer`` are effect files that are candidates beside the catalogue; ``watch`` is told the
     effects of every model that is looked at; ``mask`` are lines as :func:`masked_rows` takes them.
     """
+    from calib.discover.discovery import Refitter  # a fit goes without
+
     rows, effects = load_rows(runs, add, model)
     candidates = (*catalogue(rows.machine), *offered_effects(offer, effects), *effects)
     known = {effect.id: effect for effect in candidates}
@@ -94,6 +99,6 @@ def load_refitter(
     return refit, tuple(effect.id for effect in effects)
 
 
-def asked_for(refit: Refitter, begin: tuple[str, ...], add: Sequence[str]) -> tuple[str, ...]:
+def asked_for(refit: "Refitter", begin: tuple[str, ...], add: Sequence[str]) -> tuple[str, ...]:
     """Effects to begin a discovery with: those that the record shows are steps of their own."""
     return tuple(name for name in begin if name not in refit.rows.known or name in add)

@@ -1,9 +1,9 @@
 """Where machine descriptions are found: shipped with the program, or in a file of the lab's."""
 
 from functools import cache
-from importlib import resources
 from pathlib import Path
 
+import calib
 from app.files.text import read_text
 from calib.errors import BadInput
 from calib.mechanism.check import require_sound
@@ -11,15 +11,12 @@ from calib.mechanism.description import Machine
 from calib.mechanism.parse import parse_machine
 from calib.mechanism.variants import with_closure
 
+_SHIPPED = Path(calib.__file__).parent / "machines"
+
 
 def shipped_machines() -> list[str]:
     """Names of the machines that ship with the program."""
-    folder = resources.files("calib.machines")
-    return sorted(
-        entry.name.removesuffix(".toml")
-        for entry in folder.iterdir()
-        if entry.name.endswith(".toml")
-    )
+    return sorted(file.stem for file in _SHIPPED.glob("*.toml"))
 
 
 def load_machine(name_or_path: str, relative_to: Path | None = None) -> Machine:
@@ -59,8 +56,8 @@ def load_machine(name_or_path: str, relative_to: Path | None = None) -> Machine:
 @cache
 def _shipped(name: str) -> Machine:
     """A shipped machine; nobody can change it, and what is derived from it is derived once."""
-    shipped = resources.files("calib.machines") / f"{name}.toml"
-    return parse_machine(shipped.read_text(encoding="utf-8"), f"{name}.toml")
+    text = (_SHIPPED / f"{name}.toml").read_text(encoding="utf-8")
+    return parse_machine(text, f"{name}.toml")
 
 
 def closed_machine(name_or_path: str, closure: str) -> Machine:

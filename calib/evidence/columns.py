@@ -13,8 +13,8 @@ import numpy as np
 
 from calib.arrays import Array
 
-HELD = 6_000_000
-"""Numbers that all columns of one question may hold together (48 MB)."""
+HELD = 3_000_000
+"""Numbers that all columns of one question may hold together (24 MB)."""
 BLOCK = 1_000_000
 """Numbers in a block of trials, unless one trial alone has more."""
 

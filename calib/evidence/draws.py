@@ -13,8 +13,8 @@ import numpy as np
 from calib.arrays import Array
 from calib.evidence.problem import LinearProblem
 
-HELD = 4_000_000
-"""Numbers of noise that are held (32 MB)."""
+HELD = 2_000_000
+"""Numbers of noise that are held (16 MB)."""
 BLOCK = 4_000_000
 """Numbers in a block of draws, unless a hundred draws have more."""
 LEAST = 100
@@ -42,7 +42,7 @@ class _Noise:
             if live is not None:
                 array *= live[:, None]
             return cls(rows, draws, own, live, array)
-        for part in _parts(rows, draws):
+        for part in parts(rows, draws):
             rng.standard_normal((part.stop - part.start, draws))  # the generator goes on
         return cls(rows, draws, own, live, None)
 
@@ -64,7 +64,7 @@ class _Noise:
             yield slice(0, self.rows), self.array
             return
         rng = _copy(self.generator)
-        for part in _parts(self.rows, self.draws):
+        for part in parts(self.rows, self.draws):
             drawn = rng.standard_normal((part.stop - part.start, self.draws))
             yield part, drawn if self.live is None else drawn * self.live[part, None]
 
@@ -110,7 +110,7 @@ class Residuals:
 
     def _take_off(self, which: slice, drawn: Array) -> None:
         """What was taken off some draws (R, d), in place, a part of the rows at a time."""
-        for part in _parts(*drawn.shape):
+        for part in parts(*drawn.shape):
             for rows, pulls in self._taken:
                 drawn[part] -= rows[:, part].T @ pulls[:, which]
 
@@ -178,8 +178,8 @@ def _copy(rng: np.random.Generator) -> np.random.Generator:
     return np.random.Generator(bits)
 
 
-def _parts(rows: int, draws: int) -> Iterator[slice]:
-    """Rows a part at a time."""
+def parts(rows: int, draws: int) -> Iterator[slice]:
+    """Rows of so many numbers each, a part at a time."""
     each = max(1, ROWS // max(draws, 1))
     for first in range(0, rows, each):
         yield slice(first, min(first + each, rows))

@@ -10,7 +10,7 @@ import numpy as np
 
 from calib.arrays import Array, IntArray
 from calib.chance import log_normal_below
-from calib.evidence.draws import Residuals, squared
+from calib.evidence.draws import Residuals, parts, squared
 from calib.evidence.tails import log_tail
 
 
@@ -29,7 +29,10 @@ class Neighbours:
         return -log_normal_below((null.mean() - ratio) / null.std())
 
     def _ratio(self, residuals: Array) -> Array:
-        product = np.einsum("pd,pd->d", residuals[self.before], residuals[self.after])
+        product = np.zeros(residuals.shape[1])
+        for part in parts(self.before.size, residuals.shape[1]):
+            before, after = residuals[self.before[part]], residuals[self.after[part]]
+            product += np.einsum("pd,pd->d", before, after)
         return np.asarray(product / squared(residuals))
 
 
@@ -54,8 +57,11 @@ class RigidBlocks:
         return -log_tail(ratio * dof / null.mean(), dof)
 
     def _ratio(self, residuals: Array) -> Array:
-        within = self.bases @ residuals[self.members]
-        return np.asarray(np.einsum("bkd,bkd->d", within, within) / squared(residuals))
+        total = np.zeros(residuals.shape[1])
+        for part in parts(self.members.shape[0], self.members.shape[1] * residuals.shape[1]):
+            within = self.bases[part] @ residuals[self.members[part]]
+            total += np.einsum("bkd,bkd->d", within, within)
+        return np.asarray(total / squared(residuals))
 
 
 Quadratic = Neighbours | RigidBlocks

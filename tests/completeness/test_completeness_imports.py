@@ -14,6 +14,7 @@ FACES = {"matplotlib", "textual", "rich", "typst", "jinja2"}
 WIRES = {"canopen", "can", "serial", "sqlite3", "importlib.metadata"}
 HEAVY = {
     "import app.analysis, app.jobs.discovering": ("scipy.stats", "scipy.optimize", *FACES, *WIRES),
+    "import app.jobs.fitting": ("calib.evidence.diagnosis", "calib.discover.discovery", "zipfile"),
     "import pkmcal": ("numpy", "scipy", "click", "textual"),
     "import app.tui.program": ("scipy", "matplotlib"),
 }
