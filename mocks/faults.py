@@ -4,6 +4,10 @@ Names, with what reads them:
 
 ======================================  ==========================================================
 ``drive-fault:N``                       drive of leg N goes to fault and stays there
+``runs-away:N``                         drive N of a bare machine moves away from its targets
+``leaves-mode:N``                       one-shot: drive N of a bare machine goes to mode 1, as if a
+                                        panel or another program had told it so
+``sync-lost:N``                         drive N of a bare machine hears no SYNC
 ``heartbeat-silent:N``                  node N stops its heartbeat and answers nothing
 ``parameter-corrupt:NAME``              the controller answers another value for parameter NAME
 ``parameter-missing:NAME``              the controller does not know parameter NAME

@@ -50,6 +50,7 @@ ERROR_WORDS = {
     0x5000: "hardware error",
     0x5530: "non-volatile memory damaged",
     0x8130: "it no longer hears the PC",
+    0x8700: "SYNC does not come when it should",
     0x8611: "following error: the leg does not follow its set-point",
 }
 

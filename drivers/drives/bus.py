@@ -14,10 +14,10 @@ from drivers.canopen.drive402 import (
 from drivers.canopen.link import CanLink
 from drivers.canopen.nodes import Nodes
 from drivers.drives.axis import Axis
-from drivers.drives.cyclic import map_setpoint
 from drivers.drives.plan import Plan
 from drivers.drives.recognise import check_eds, recognise, together
 from drivers.drives.set_up import SetUp
+from drivers.drives.sync import take_setpoints
 from drivers.drives.units import counts_of
 from drivers.errors import ConnectFailed, DeviceError, DeviceFault, LinkError, Refused, Silence
 from drivers.interface import Alarm, Identity
@@ -78,7 +78,7 @@ class DriveBus(Nodes):
             set_up = self._set_ups[axis.node]
             await set_up.run()
             if self.plan.cyclic:
-                await map_setpoint(set_up.drive, axis.node, self.plan.sync_s)
+                await take_setpoints(set_up.drive, self.plan.sync_s)
         await super().watch()
 
     async def farewell(self) -> None:

@@ -1,81 +1,33 @@
 """Cyclic synchronous position: set-points by RPDO, taken by all drives at the same SYNC."""
 
-import logging
-import struct
 import threading
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-from drivers.canopen.drive402 import TARGET_POSITION, Drive402
-from drivers.canopen.link import CanLink
-from drivers.drives.profile import Profile
-from drivers.errors import LinkLost, Refused
-
-logger = logging.getLogger(__name__)
-SYNC = (0x80, b"")
-INTERPOLATION = 0x60C2
-INVALID = 1 << 31
-COMMUNICATION, MAPPING, BASE = 0x1401, 0x1601, 0x300
-
-
-async def map_setpoint(drive: Drive402, node: int, period_s: float) -> None:
-    """Map 0x607A alone into RPDO 2, taken at each SYNC, and set 0x60C2; raises Refused.
-
-    0x60C2 is not in every drive: those without it take the period from SYNC itself.
-    """
-
-    def write() -> None:
-        device, cob_id = drive.remote, BASE + node
-        steps = (
-            (COMMUNICATION, 1, struct.pack("<I", cob_id | INVALID)),
-            (MAPPING, 0, b"\0"),
-            (MAPPING, 1, struct.pack("<I", TARGET_POSITION << 16 | 32)),
-            (MAPPING, 0, b"\1"),
-            (COMMUNICATION, 2, b"\1"),
-            (COMMUNICATION, 1, struct.pack("<I", cob_id)),
-        )
-        for index, sub, data in steps:
-            device.download(index, sub, data)
-
-    try:
-        await drive.remote.call(write)
-    except Refused as error:
-        raise Refused(
-            f"does not let its RPDO 2 be mapped: {error.what}",
-            device=drive.device,
-            remedy='Use mode = "profile".',
-            code=error.code,
-        ) from error
-    if drive.has(INTERPOLATION, 1):
-        await drive.write(INTERPOLATION, round(period_s * 1000.0), 1)
-        await drive.write(INTERPOLATION, -3, 2)
-
-
-@dataclass(frozen=True)
-class _Way:
-    starts: tuple[int, ...]
-    targets: tuple[int, ...]
-    profile: Profile
-    begin_s: float
+from drivers.canopen.drive402 import TARGET_POSITION
+from drivers.drives.bus import DriveBus
+from drivers.drives.sync import SYNC, setpoint_frame
+from drivers.drives.way import Counts, Straight, Table, Way
+from drivers.errors import LinkLost
+from drivers.interface import Alarm
 
 
 class Stream:
     """Sends the set-points of all drives, then SYNC, each period, from :meth:`start` to the stop.
 
-    The thread keeps its own time; a period that comes late is made up for by the next, so that
-    set-points stay on the profile. ``time_scale``: machine seconds a wall second.
+    A set-point is a period of machine time after the one before it, however late it is sent: a
+    busy computer makes a motion longer, never faster, and whoever listens is told.
     """
 
-    def __init__(
-        self, link: CanLink, drives: Sequence[Drive402], period_s: float, time_scale: float
-    ) -> None:
-        self._link = link
-        self._drives = tuple(drives)
-        self._period_s = period_s
-        self._time_scale = time_scale
-        self._way: _Way | None = None
-        self._held: tuple[int, ...] = ()
+    def __init__(self, bus: DriveBus) -> None:
+        self._bus = bus
+        self._period_s = bus.plan.sync_s
+        self._step_s = bus.plan.sync_s * bus.plan.time_scale
+        self._way: Way | None = None
+        self._time = 0.0
+        self._next: Counts | None = None
+        self._held: Counts = ()
+        self._late: list[float] = []
         self._end = threading.Event()
         self._thread: threading.Thread | None = None
         self._lock = threading.Lock()
@@ -83,7 +35,7 @@ class Stream:
     def start(self, held: Sequence[int]) -> None:
         """Begin to send, holding every drive where it stands."""
         self.stop()
-        self._held, self._way = tuple(held), None
+        self._held, self._way, self._next = tuple(held), None, None
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._run, name="canopen-sync", daemon=True)
         self._thread.start()
@@ -100,12 +52,31 @@ class Stream:
         with self._lock:
             held = list(self._held)
             held[n] = counts
-            self._held, self._way = tuple(held), None
+            self._held, self._way, self._next = tuple(held), None, None
 
-    def go(self, targets: Sequence[int], profile: Profile) -> None:
-        """Begin the way from the present set-points to ``targets``."""
+    def go(self, targets: Sequence[int]) -> None:
+        """Begin the way to ``targets``; what is under way is braked to rest before.
+
+        Not while a trajectory is played: that has no ramp on which it could be braked.
+        """
         with self._lock:
-            self._way = _Way(self._held, tuple(targets), profile, time.monotonic())
+            if self._way is None:
+                self._begin(Straight.of(self._bus.axes, self._held, tuple(targets)))
+            else:
+                assert not isinstance(self._way, Table)
+                self._begin(self._way.braked(self._time))
+                self._next = tuple(targets)
+
+    def play(self, table: Table) -> None:
+        """Begin a trajectory that starts where all are held."""
+        with self._lock:
+            self._begin(table)
+
+    @property
+    def held(self) -> Counts:
+        """The set-points that were sent last."""
+        with self._lock:
+            return self._held
 
     @property
     def over(self) -> bool:
@@ -113,28 +84,58 @@ class Stream:
         with self._lock:
             return self._way is None
 
-    def _setpoints(self, now: float) -> tuple[int, ...]:
+    @property
+    def plays(self) -> bool:
+        """Whether a trajectory is under way."""
         with self._lock:
-            way = self._way
-            if way is not None:
-                part = way.profile.at((now - way.begin_s) * self._time_scale)
-                pairs = zip(way.starts, way.targets, strict=True)
-                self._held = tuple(round(a + part * (b - a)) for a, b in pairs)
-                if part >= 1.0:
-                    self._way = None
+            return isinstance(self._way, Table)
+
+    def _begin(self, way: Way) -> None:
+        self._way, self._time, self._late = way, 0.0, []
+
+    def _step(self) -> Counts:
+        """Set-points one period on."""
+        with self._lock:
+            if any(drive.stopped for drive in self._bus.drives):
+                self._way = self._next = None
+            if self._way is not None:
+                self._time += self._step_s
+                self._held = self._way.at(self._time)
+                if self._time >= self._way.duration:
+                    self._arrive()
             return self._held
+
+    def _arrive(self) -> None:
+        self._tell_late()
+        targets, self._way, self._next = self._next, None, None
+        if targets is not None:
+            self._begin(Straight.of(self._bus.axes, self._held, targets))
+
+    def _tell_late(self) -> None:
+        if self._late:
+            times = "once" if len(self._late) == 1 else f"{len(self._late)} times"
+            what = (
+                f"SYNC came late {times} in a motion, at most by {max(self._late):.3g} s: it took "
+                f"{sum(self._late):.3g} s longer"
+            )
+            remedy = 'Choose a longer sync_s or mode = "profile", or keep this computer free.'
+            self._bus.link.in_loop(self._bus.alarm, Alarm("drives", what, remedy))
 
     def _run(self) -> None:
         due = time.monotonic()
         while not self._end.wait(max(due - time.monotonic(), 0.0)):
-            now = time.monotonic()
-            due = max(due + self._period_s, now)
+            late = time.monotonic() - due
+            if late > self._period_s:
+                self._late.append(late)
+            drives = self._bus.drives
             frames = []
-            for drive, counts in zip(self._drives, self._setpoints(now), strict=True):
+            for drive, counts in zip(drives, self._step(), strict=True):
                 drive.tell(TARGET_POSITION, counts)
-                frames.append((BASE + drive.remote.id, struct.pack("<i", counts)))
+                frames.append(setpoint_frame(drive, counts))
             try:
-                self._link.send_now([*frames, SYNC])
+                self._bus.link.send_now([*frames, SYNC])
             except LinkLost as error:
-                logger.info("%s", error)
+                self._bus.link.latch("link", error)
                 return
+            # What was late shifts all that follows: two SYNCs are never nearer than half a period.
+            due = max(due + self._period_s, time.monotonic() + 0.5 * self._period_s)

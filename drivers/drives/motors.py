@@ -5,16 +5,11 @@ starts them: at 500 kbit/s six frames take 1.5 ms. In mode ``cyclic`` SYNC start
 """
 
 import asyncio
-import math
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from drivers.canopen.drive402 import (
     ACTUAL_POSITION,
-    AT_ONCE,
     DISABLE_VOLTAGE,
-    ENABLE,
-    NEW_SETPOINT,
     STATUSWORD,
     TARGET_POSITION,
     Drive402,
@@ -25,15 +20,15 @@ from drivers.drives.axis import Axis
 from drivers.drives.bus import DriveBus, check_files
 from drivers.drives.cyclic import Stream
 from drivers.drives.plan import Plan
-from drivers.drives.profile import Profile
+from drivers.drives.profiled import start_profiles
+from drivers.drives.rest import at_rest
+from drivers.drives.sync import must_take_setpoints
+from drivers.drives.targets import in_counts, table_of
 from drivers.drives.travel import Travel
-from drivers.errors import DeviceError, LinkError, Refused, Silence
+from drivers.errors import DeviceError, LinkError, Refused
 from drivers.interface import ActuatorState, Alarm, ControllerCan, ControllerState, Identity
 
 HOMING_DEADLINE_S = 120.0
-REST_DEADLINE_S = 3.0
-POLL_S = 0.01
-PROFILE_VELOCITY, PROFILE_ACCELERATION, PROFILE_DECELERATION = 0x6081, 0x6083, 0x6084
 
 
 class DriveMotors:
@@ -56,7 +51,7 @@ class DriveMotors:
         self._moving: asyncio.Lock = asyncio.Lock()
         self._stream: Stream | None = None
         if bus.plan.cyclic:
-            self._stream = Stream(bus.link, bus.drives, bus.plan.sync_s, bus.plan.time_scale)
+            self._stream = Stream(bus)
 
     @classmethod
     async def connect(cls, plan: Plan) -> "DriveMotors":
@@ -232,49 +227,49 @@ class DriveMotors:
         before any of them moves; DriveFault or Silence after all were stopped.
         """
         self.check()
-        counts = self._in_counts(q)
+        counts = in_counts(self._bus, q)
         async with self._moving:
             await self._must_be_ready()
+            if self._stream is not None and self._stream.plays:
+                raise _under_way()
+            stands = self._travel is None or self._travel.over
             starts = await asyncio.gather(*(d.read(ACTUAL_POSITION) for d in self._bus.drives))
-            ways = [
-                (target - start) / axis.scale
-                for target, start, axis in zip(counts, starts, self._bus.axes, strict=True)
-            ]
-            profile = Profile.of(self._bus.axes, ways)
             self._end_travel()
             self._targets = {a.name: value for a, value in zip(self._bus.axes, q, strict=True)}
             try:
                 if self._stream is not None:
-                    self._stream.go(counts, profile)
+                    self._stream.go(counts)
                 else:
-                    await self._start_profiles(counts, ways, profile)
+                    await start_profiles(self._bus, counts, starts, self._must_not_be_stopped)
             except DeviceError:
                 await self._bus.send_stop()
                 raise
-            self._travel = Travel(self._bus, self._stream, starts, counts)
+            self._travel = Travel(self._bus, self._stream, starts, counts, straight=stands)
 
-    def _in_counts(self, q: tuple[float, ...]) -> list[int]:
-        if len(q) != len(self._bus.axes) or not all(map(math.isfinite, q)):
+    async def play_actuators(self, rows: Sequence[Sequence[float]], every_s: float) -> None:
+        """Start along ``rows`` (N, A) of q, one each ``every_s`` seconds; mode ``cyclic`` only.
+
+        :meth:`wait_arrived` waits for its end. Raises Refused, before anything moves, if it does
+        not begin where the machine is held, passes limits, speed or acceleration, or if another
+        motion is under way.
+        """
+        self.check()
+        if self._stream is None:
             raise Refused(
-                f"{len(self._bus.axes)} finite values are wanted, got {q}",
-                device="drives",
-                remedy="Nothing was commanded.",
-            )
-        counts = []
-        for value, axis in zip(q, self._bus.axes, strict=True):
-            low, high = self._bus.soft_limits(axis)
-            target = axis.to_counts(value)
-            if not low <= target <= high:
-                lowest, highest = sorted((axis.to_q(low), axis.to_q(high)))
-                raise Refused(
-                    f"{axis.name} = {value:.6g} {axis.unit} is outside {lowest:.6g} to "
-                    f"{highest:.6g}",
-                    device=f"drive {axis.name} (node {axis.node})",
-                    remedy="Nothing was commanded. Choose values within the limits; they are the "
-                    "narrower of the site file's and those that 0x607D held at connect.",
-                )
-            counts.append(target)
-        return counts
+                "drives that make their own profiles cannot play a trajectory", device="drives",
+                remedy='Write mode = "cyclic" under [controller].',
+            )  # fmt: skip
+        async with self._moving:
+            await self._must_be_ready()
+            if self._travel is not None and not self._travel.over:
+                raise _under_way()
+            table = table_of(self._bus, rows, every_s, self._stream.held)
+            self._end_travel()
+            names = (axis.name for axis in self._bus.axes)
+            self._targets = dict(zip(names, map(float, rows[-1]), strict=True))
+            self._stream.play(table)
+            ends = table.rows[-1]
+            self._travel = Travel(self._bus, self._stream, ends, ends, straight=False)
 
     async def _must_be_ready(self) -> None:
         for actuator in (await self.state()).actuators:
@@ -286,26 +281,8 @@ class DriveMotors:
                 )  # fmt: skip
             if not actuator.homed:
                 raise Refused("does not know its reference", device=device, remedy="Home it first.")
-
-    async def _start_profiles(self, counts: list[int], ways: list[float], profile: Profile) -> None:
-        """Write what each drive shall do, then start all of them with one frame each."""
-        drives = self._bus.drives
-
-        async def prepare(drive: Drive402, axis: Axis, target: int, way: float) -> None:
-            acceleration = profile.acceleration_of(axis, way)
-            await drive.write(TARGET_POSITION, target)
-            await drive.write(PROFILE_VELOCITY, profile.speed_of(axis, way))
-            await drive.write(PROFILE_ACCELERATION, acceleration)
-            if drive.has(PROFILE_DECELERATION):
-                await drive.write(PROFILE_DECELERATION, acceleration)
-
-        each = zip(drives, self._bus.axes, counts, ways, strict=True)
-        await asyncio.gather(*(prepare(*one) for one in each))
-        self._must_not_be_stopped()
-        await self._bus.send_controlword(ENABLE | NEW_SETPOINT | AT_ONCE)
-        await asyncio.gather(*(drive.acknowledge(True) for drive in drives))
-        self._must_not_be_stopped()
-        await self._bus.send_controlword(ENABLE)
+        if self._stream is not None:
+            await asyncio.gather(*(must_take_setpoints(drive) for drive in self._bus.drives))
 
     def _must_not_be_stopped(self) -> None:
         if self._stopped:
@@ -339,7 +316,7 @@ class DriveMotors:
         try:
             await self._bus.send_stop()
             self._end_stream()
-            await self._rest()
+            await at_rest(self._bus, self.state)
         except LinkError as error:
             if not again:
                 raise type(error)(
@@ -348,27 +325,6 @@ class DriveMotors:
                     remedy="Use the emergency stop. Drives stop by themselves without the PC.",
                 ) from error
 
-    async def _rest(self) -> None:
-        """Wait until no drive has power and none moves; tell again one that still has it."""
-        deadline = time.monotonic() + REST_DEADLINE_S
-        before: list[float] = []
-        while True:
-            actuators = (await self.state()).actuators
-            now = [actuator.position for actuator in actuators]
-            on = [a for a in actuators if a.state == "operation enabled"]
-            still = len(before) == len(now) and all(
-                abs(one - two) <= 2.0 / abs(axis.scale)
-                for one, two, axis in zip(before, now, self._bus.axes, strict=True)
-            )
-            if still and not on:
-                return
-            if time.monotonic() > deadline:
-                raise Silence("the machine is still moving, or has power", device="drives")
-            if on:
-                await self._bus.send_stop()
-            before = now
-            await asyncio.sleep(POLL_S)
-
     # ------------------------------------------------------------ the end
 
     async def close(self) -> None:
@@ -376,3 +332,11 @@ class DriveMotors:
         self._end_stream()
         self._end_travel()
         await self._bus.leave()
+
+
+def _under_way() -> Refused:
+    return Refused(
+        "another motion is under way",
+        device="drives",
+        remedy="Wait for its end, or stop the machine.",
+    )

@@ -49,6 +49,13 @@ class Profile:
         begun = min(time, ramp)
         return 0.5 * self.acceleration * begun**2 + self.acceleration * ramp * (time - begun)
 
+    def rate_at(self, time: float) -> float:
+        """ds/dt, 1/s, after ``time`` s on that ramp."""
+        left = self.duration - time
+        if time <= 0.0 or left <= 0.0:
+            return 0.0
+        return min(self.rate, self.acceleration * min(time, left))
+
     def speed_of(self, axis: Axis, way: float) -> int:
         """0x6081 of an axis: at least 1, because some drives take 0 for never."""
         speed = min(abs(way) * self.rate, axis.speed) if way else axis.speed

@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Sequence
 
 from drivers.canopen.drive402 import (
+    ACKNOWLEDGED,
     ACTUAL_POSITION,
     ERROR_CODE,
     LIMITED,
@@ -16,6 +17,8 @@ from drivers.canopen.drive402 import (
 from drivers.drives.axis import Axis
 from drivers.drives.bus import DriveBus
 from drivers.drives.cyclic import Stream
+from drivers.drives.follower import Follower
+from drivers.drives.sync import must_take_setpoints
 from drivers.errors import DeviceError, DeviceFault, DriveFault, LinkError, Refused, Silence
 
 POLL_S = 0.01
@@ -24,13 +27,24 @@ AWAY = 4
 
 
 class Travel:
-    """One motion from ``starts`` to ``targets`` (counts); it watches itself from the beginning."""
+    """One motion from ``starts`` to ``targets`` (counts); it watches itself from the beginning.
+
+    ``straight``: every drive goes straight from its start to its target. One that was under way,
+    or plays a trajectory, may first go elsewhere.
+    """
 
     def __init__(
-        self, bus: DriveBus, stream: Stream | None, starts: Sequence[int], targets: Sequence[int]
+        self,
+        bus: DriveBus,
+        stream: Stream | None,
+        starts: Sequence[int],
+        targets: Sequence[int],
+        straight: bool = True,
     ) -> None:
+        self._straight = straight
         self._bus = bus
         self._stream = stream
+        self._followers = [Follower(axis, bus) for axis in bus.axes]
         self._starts = tuple(starts)
         self._targets = tuple(targets)
         self._task = asyncio.ensure_future(self._watch())
@@ -74,11 +88,16 @@ class Travel:
 
     async def _arrived(self) -> bool:
         self._bus.link.check()
+        held = self._stream.held if self._stream is not None else ()
         each = zip(self._bus.drives, self._bus.axes, self._starts, self._targets, strict=True)
-        there = await asyncio.gather(*(self._look(*one) for one in each))
-        return all(there) and (self._stream is None or self._stream.over)
+        looks = await asyncio.gather(*(self._look(*one) for one in each))
+        if self._stream is not None:
+            for follower, (_, counts), setpoint in zip(self._followers, looks, held, strict=True):
+                follower.look(counts, setpoint)
+        over = self._stream is None or self._stream.over
+        return all(there for there, _ in looks) and over
 
-    async def _look(self, drive: Drive402, axis: Axis, start: int, target: int) -> bool:
+    async def _look(self, drive: Drive402, axis: Axis, start: int, target: int) -> tuple[bool, int]:
         word, counts = await drive.remote.call(
             lambda: (drive.read_now(STATUSWORD), drive.read_now(ACTUAL_POSITION))
         )
@@ -93,7 +112,10 @@ class Travel:
                 device=drive.device,
                 remedy="Enable the machine and command the motion again.",
             )
-        self._must_not_run_away(drive, axis, start, target, counts)
+        if self._stream is not None and not word & ACKNOWLEDGED:  # there: it follows set-points
+            await must_take_setpoints(drive)
+        if self._straight:
+            self._must_not_run_away(drive, axis, start, target, counts)
         near = abs(counts - target) <= self._bus.window(axis)
         if self._stream is None and word & REACHED and word & LIMITED and not near:
             raise Refused(
@@ -101,7 +123,7 @@ class Travel:
                 device=drive.device,
                 remedy="The actuator stands at its limit; command a position inside.",
             )
-        return near and (self._stream is not None or bool(word & REACHED))
+        return near and (self._stream is not None or bool(word & REACHED)), counts
 
     def _must_not_run_away(
         self, drive: Drive402, axis: Axis, start: int, target: int, counts: int

@@ -7,7 +7,8 @@ reference; some count backwards. It does what real drives do beside the standard
 * bits 10 and 12 of an earlier homing stand for :data:`STALE_S` after a new one has begun;
 * RPDOs are mapped as the PC writes it; one that is too short is dropped, with EMCY 0x8210;
 * without the PC's heartbeat it does what 0x6007 says;
-* in mode 8 it goes to 0x607A at each SYNC, within the period of 0x60C2.
+* in mode 8 it goes to 0x607A at each SYNC, within the period of 0x60C2; without SYNC it stands
+  where the last one sent it, and says so only if 0x1006 tells it when to expect one.
 
 These times are wall time, as those of heartbeats are.
 """
@@ -38,7 +39,7 @@ from mocks.canopen.ports import Machine
 from mocks.canopen.state402 import State
 
 LATE_MODE_S, LATE_RESET_S, STALE_S = 0.03, 0.02, 0.03
-EMCY_PDO_LENGTH = 0x8210
+EMCY_PDO_LENGTH, EMCY_SYNC = 0x8210, 0x8700
 NOTHING, MALFUNCTION, DISABLE_VOLTAGE, QUICK_STOP = 0, 1, 2, 3
 QUICK_STOP_CODES = (0, 1, 2, 3, 5, 6, 7)
 STAYS_IN_QUICK_STOP = (5, 6, 7)
@@ -148,7 +149,15 @@ class BareDrive(Drive):
         if self._late_reset is not None and now >= self._late_reset:
             self._late_reset = None
             super()._reset_fault()
+        if self.machine.faults.take(f"leaves-mode:{self.number}"):
+            self.leg.stop()
+            self.mode = PROFILE_POSITION
+        if self.follows and self._misses_sync() and self.value(0x1006):
+            self.fail(EMCY_SYNC)
         super().tick()
+
+    def _misses_sync(self) -> bool:
+        return f"sync-lost:{self.number}" in self.machine.faults
 
     def lose_pc(self) -> None:
         """What 0x6007 says of a connection that is gone."""
@@ -204,7 +213,7 @@ class BareDrive(Drive):
                 continue  # a PDO has nobody to answer
 
     def _on_sync(self, _cob_id: int, _data: bytearray, _timestamp: float) -> None:
-        if self.nmt.state != OPERATIONAL:
+        if self.nmt.state != OPERATIONAL or self._misses_sync():
             return
         for number, data in sorted(self._waiting_for_sync.items()):
             self._apply(number, data)

@@ -88,6 +88,8 @@ def bare_objects(unit: str) -> list[Object]:
     return [
         *(obj for obj in named if obj.index not in (0x1010, 0x1011)),
         *kept,
+        variable(0x1005, Entry("COB-ID SYNC message", "U32", "rw", 0x80)),
+        variable(0x1006, Entry("Communication cycle period", "U32", "rw", 0, "us")),
         variable(
             0x6067, Entry("Position window", "U32", "rw", round(gearing.counts * 1e-4), "inc")
         ),

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -303,4 +304,8 @@ async def by_hand_bench() -> AsyncIterator[MotorsBench]:
     )
 
 
-MOTORS = {"drives": motors_bench, "operator": by_hand_bench}
+MOTORS = {
+    "drives": motors_bench,
+    "drives, cyclic": partial(motors_bench, "cyclic"),
+    "operator": by_hand_bench,
+}

@@ -16,6 +16,8 @@ from app.devices import kind_names
 from drivers.contract import CONTROLLER_LAWS, MOTORS_LAWS, POSE_LAWS, TRACKER_LAWS, Law, why_not
 from mocks.linuxcnc.program import why_not as why_not_linuxcnc
 
+MOTION = ("moves", "move", "together")
+
 
 @pytest.mark.parametrize("law", TRACKER_LAWS, ids=str)
 @pytest.mark.parametrize("kind", TRACKERS)
@@ -52,6 +54,8 @@ async def test_linuxcnc(law: Law, tmp_path: Path) -> None:
 async def test_motors(kind: str, law: Law) -> None:
     if kind == "operator" and "together" in law.says:
         pytest.skip("how a person brings a machine there is the person's business")
+    if kind == "drives, cyclic" and not law.needs and not any(one in law.says for one in MOTION):
+        pytest.skip("it is the same in every mode")
     async with MOTORS[kind]() as bench:
         if reason := await why_not(law, bench):
             pytest.skip(reason)
@@ -70,4 +74,5 @@ async def test_pose_mover(kind: str, law: Law) -> None:
 
 def test_every_kind_that_ships_has_a_bench() -> None:
     assert set(TRACKERS) == set(kind_names("tracker"))
-    assert {*CONTROLLERS, "linuxcnc", *MOTORS, *POSE_MOVERS} == set(kind_names("controller"))
+    motors = {name.partition(",")[0] for name in MOTORS}
+    assert {*CONTROLLERS, "linuxcnc", *motors, *POSE_MOVERS} == set(kind_names("controller"))

@@ -3,6 +3,7 @@
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from drivers.drives.axis import Axis
 from drivers.drives.plan import Referenced
 from drivers.drives.profile import Profile
+from drivers.drives.way import Straight
 
 WAY = st.floats(-40.0, 40.0).map(lambda way: round(way, 9))  # a drive counts no finer
 WAYS = st.lists(WAY, min_size=2, max_size=6)
@@ -97,3 +99,26 @@ def test_counts_and_back(q, sign, offset):
 )
 def test_where_a_drive_says_its_reference(text, meant):
     assert Referenced.parse(text) == meant
+
+
+@settings(max_examples=40)
+@given(
+    st.lists(st.integers(-5_000_000, 5_000_000), min_size=3, max_size=3),
+    st.floats(0.05, 0.95),
+    FASTEST,
+)
+def test_what_is_braked_stays_on_its_way_and_brakes_as_hard_as_it_may(ends, when, fastest):
+    each = axes(3, fastest)
+    way = Straight.of(each, (0, 0, 0), tuple(ends))
+    begun = when * way.duration
+    braked = way.braked(begun)
+    again = braked.braked(0.3 * braked.duration)
+    period = 0.01
+    times = np.arange(0.0, braked.duration + 2.0 * period, period)
+    points = np.array([way.at(begun - period), *(braked.at(t) for t in times)])
+    assert np.abs(np.array(again.at(again.duration)) - braked.ends).max() <= 1
+    hardest = np.array([a.acceleration * abs(a.scale) for a in each]) * period**2
+    assert (np.abs(np.diff(points, n=2, axis=0)) <= hardest + 4.0).all()
+    low, high = np.minimum(ends, 0), np.maximum(ends, 0)
+    assert ((points >= low) & (points <= high)).all()
+    assert (points[-1] == points[-2]).all()
