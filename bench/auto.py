@@ -25,7 +25,6 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
-from scipy.stats import beta, binom
 
 from app.auto.autopilot import Autopilot, Seen
 from app.auto.findings import Findings, fresh_poses, look
@@ -37,6 +36,7 @@ from app.jobs.posing import choose_poses
 from app.jobs.predicting import predict
 from bench._blind_cases import NEXT_TO_NONE_MM, SIGMA_MM, Case, build, drawn_on
 from bench._blind_noise import noisy
+from bench._intervals import median, share
 from mocks.hidden.table import Hidden
 from mocks.simulate.files import write
 from mocks.simulate.plan import Profile, RunPlan
@@ -47,7 +47,7 @@ MINUTES_A_POSE = 2.0
 CORRELATED = "ar:0.3"
 QUIET_MM = 5e-5
 """Noise of the readings that tell the true error."""
-OF_ONE_RUN = ("frame-shift", "actuator-step", "warm-up")
+OF_ONE_RUN = ("frame-shift", "actuator-step", "nest-step", "warm-up")
 """Events of one run: a world of several runs cannot hold them alike."""
 
 
@@ -209,38 +209,21 @@ def table(came: Sequence[Mapping[str, Came]], targets_um: Sequence[float]) -> li
     heads = [*(f"decides by itself, {target:g} um" for target in targets_um), f"{FIXED} poses"]
     lines = ["| | " + " | ".join(heads) + " |", "|---" * (1 + len(ways)) + "|"]
     rows: dict[str, Callable[[Sequence[Came]], str]] = {
-        "readings for the fit, median": lambda all_: _median([c.readings for c in all_]),
-        "readings to prove it, median": lambda all_: _median([c.proof for c in all_]),
-        "true error, um, median": lambda all_: _median([c.true_um for c in all_]),
-        "all hidden effects named": lambda all_: _share([c.named for c in all_]),
-        "nothing else named": lambda all_: _share([not c.false_names for c in all_]),
-        "a pair is left in question": lambda all_: _share([c.open > 0 for c in all_]),
-        "says that the target holds": lambda all_: _share([c.reached for c in all_]),
+        "readings for the fit, median": lambda all_: median([c.readings for c in all_]),
+        "readings to prove it, median": lambda all_: median([c.proof for c in all_]),
+        "true error, um, median": lambda all_: median([c.true_um for c in all_]),
+        "all hidden effects named": lambda all_: share([c.named for c in all_]),
+        "nothing else named": lambda all_: share([not c.false_names for c in all_]),
+        "a pair is left in question": lambda all_: share([c.open > 0 for c in all_]),
+        "says that the target holds": lambda all_: share([c.reached for c in all_]),
     }
     for says, of in rows.items():
         cells = [of([one[way] for one in came]) for way in ways]
         lines.append(f"| {says} | " + " | ".join(cells) + " |")
     for target in targets_um:
-        cells = [_share([one[way].true_um <= target for one in came]) for way in ways]
+        cells = [share([one[way].true_um <= target for one in came]) for way in ways]
         lines.append(f"| true error within {target:g} um | " + " | ".join(cells) + " |")
     return lines
-
-
-def _median(values: Sequence[float]) -> str:
-    """The median, and order statistics that hold it with 95 %, whatever the distribution."""
-    ordered, count = sorted(values), len(values)
-    low = max(int(binom.ppf(0.025, count, 0.5)), 1)
-    return f"{np.median(ordered):.3g} ({ordered[low - 1]:.3g}, {ordered[count - low]:.3g})"
-
-
-def _share(true: Sequence[bool | None]) -> str:
-    """A share with its interval by Clopper and Pearson; a dash where nobody was asked."""
-    if None in true:
-        return "-"
-    k, n = sum(map(bool, true)), len(true)
-    low = beta.ppf(0.025, k, n - k + 1) if k else 0.0
-    high = beta.ppf(0.975, k + 1, n - k) if k < n else 1.0
-    return f"{100 * k / n:.0f} % ({100 * low:.0f}, {100 * high:.0f})"
 
 
 def by_kind(worlds: Sequence[World], done: Mapping[int, Mapping[str, Came]]) -> list[str]:

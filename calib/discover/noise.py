@@ -17,7 +17,8 @@ from calib.effects.component import Effect
 from calib.evidence.findings import Joined
 from calib.evidence.problem import LinearProblem
 from calib.identify.fitting import Fit, with_noise
-from calib.noise import estimate
+from calib.noise import Found, Taking, estimate
+from calib.noise.estimate import DEMANDED
 
 CLEAR = float(np.log(1e-3))
 """log p of a test of structure, on its own, from which noise is asked for in an adequate model."""
@@ -41,8 +42,7 @@ def judge(fit: Fit, catalogue: Sequence[Effect], seed: int) -> RunDiagnosis:
     if not _suspicious(white):
         return white
     problem, taking = fit.problem, fit.taking
-    kept = white.diagnosis.joined
-    found = estimate(_enlarged(problem, kept), taking)
+    kept, found = _beside(problem, taking, white.diagnosis.joined)
     structure = white.diagnosis.structure
     if structure is not None and structure.log_evidence > 0.0:
         beside = estimate(_enlarged(problem, (*kept, structure)), taking)
@@ -63,6 +63,28 @@ def judge(fit: Fit, catalogue: Sequence[Effect], seed: int) -> RunDiagnosis:
         kept = left
         found = estimate(_enlarged(problem, kept), taking)
     return answer
+
+
+def _beside(
+    problem: LinearProblem, taking: Taking, joined: Sequence[Joined]
+) -> tuple[tuple[Joined, ...], Found]:
+    """Those of the effects called for that say more than noise would, and the noise beside them.
+
+    In the order of their evidence: one stays where its evidence is more than what its going lets
+    noise explain. Slow noise is so not taken for a drift, nor a drift for slow noise.
+    """
+    kept: tuple[Joined, ...] = ()
+    found = estimate(problem, taking)
+    for one in joined:
+        beside = estimate(_enlarged(problem, (*kept, one)), taking)
+        if one.log_evidence + _worth(beside) > _worth(found):
+            kept, found = (*kept, one), beside
+    return kept, found
+
+
+def _worth(found: Found) -> float:
+    """Log of what noise explains, less what the freedom of its components does by chance."""
+    return found.gain - DEMANDED * len(found.components)
 
 
 def inflation(white: Fit, noisy: Fit) -> float:

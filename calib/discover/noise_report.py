@@ -46,7 +46,7 @@ def _scale(found: RunDiagnosis, one: Component) -> tuple[float, str]:
     """Factor and unit of a component's value: s, a ratio, or the first actuator's unit."""
     if one.name == "correlated":
         return 1.0, "s"
-    if one.name == "scale":
+    if one.name in ("scale", "walk"):
         return 1.0, "1"
     axis = found.fit.model.rows.machine.axes[0]
     return axis.usual_error, axis.unit
@@ -60,6 +60,11 @@ def _says(found: RunDiagnosis, one: Component) -> str:
         return (
             f"the noise is correlated over {_time(one.value, one.sigma)} "
             f"({alike:.2f} between successive readings)"
+        )
+    if one.name == "walk":
+        return (
+            f"the noise wanders by {plus_minus(one.value, one.sigma)} sigma from one reading to "
+            "the next, and does not come back within the run"
         )
     if one.name == "scale":
         return (

@@ -34,6 +34,9 @@ class Noise:
         Standard deviation of the actuators' errors from visit to visit, in usual errors.
     by_row : bool
         Whether correlation falls from reading to reading, whatever the time between them.
+    step : float
+        Where what is correlated wanders without fading (``tau_s`` is far beyond the run): its steps
+        over the usual gap, in white sigmas. 0 where it fades.
     """
 
     scale: float = 1.0
@@ -41,6 +44,12 @@ class Noise:
     share: float = 1.0
     visit: float = 0.0
     by_row: bool = False
+    step: float = 0.0
+
+    @property
+    def narrow(self) -> float:
+        """Standard deviation, over the stated one, without what wanders."""
+        return self.scale * float(np.sqrt(1.0 - self.share)) if self.step > 0.0 else self.scale
 
 
 WHITE = Noise()

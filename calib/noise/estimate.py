@@ -33,19 +33,23 @@ FAINT = 0.3
 """The same below which a component is not tried again beside others."""
 SHARED = 2.0
 """The same of a white part beside the correlated one."""
-PARTS = ("correlated", "successive", "visit", "scale")
-"""``correlated`` in time and ``successive``, from row to row, are one or the other."""
-
-
-TIED = {"correlated", "successive"}
+FADING, WANDERING = ("correlated", "successive"), ("walk", "walk-by-row")
+"""What goes on in time, or from row to row: it fades, or wanders without end, where some fades."""
+TIED = (*FADING, *WANDERING)
+"""One or the other."""
+PARTS = (*TIED, "visit", "scale")
+SAID = {"successive": "correlated", "walk-by-row": "walk"}
+WANDERED = 10.0
+"""Time constant of what wanders, in lengths of a run: within the run it does not fade."""
 
 
 @dataclass(frozen=True)
 class Component:
     """A component of the noise.
 
-    ``name`` correlated, visit or scale; ``value`` s, usual errors, or a ratio; ``sigma`` standard
-    uncertainty of the value; ``p_value`` of having none.
+    ``name`` correlated, walk, visit or scale; ``value`` s, stated sigmas from one reading to the
+    next, usual errors, or a ratio; ``sigma`` standard uncertainty of the value; ``p_value`` of
+    having none.
     """
 
     name: str
@@ -75,13 +79,13 @@ class _Likelihood:
         shortest = np.log(0.2 * taking.usual_gap_s)
         self.low = {
             "correlated": shortest, "successive": shortest, "visit": np.log(0.02),
-            "scale": np.log(0.2), "share": -4.0,
+            "walk": np.log(0.02), "walk-by-row": np.log(0.02), "scale": np.log(0.2), "share": -4.0,
         }  # fmt: skip
         longest = max(0.5 * taking.span_s, 2.0 * taking.usual_gap_s)
         self.high = {
             "correlated": np.log(longest), "successive": np.log(longest),
-            "visit": np.log(10.0), "scale": np.log(20.0),
-            "share": 6.0,
+            "visit": np.log(10.0), "walk": np.log(3.0), "walk-by-row": np.log(3.0),
+            "scale": np.log(20.0), "share": 6.0,
         }  # fmt: skip
 
     def at(self, parts: Sequence[str], logs: Sequence[float]) -> float:
@@ -92,14 +96,18 @@ class _Likelihood:
             part: float(np.clip(log, self.low[part], self.high[part]))
             for part, log in zip(parts, logs, strict=True)
         }
-        tau = clipped.get("correlated", clipped.get("successive"))
-        return Noise(
-            scale=float(np.exp(clipped.get("scale", 0.0))),
-            tau_s=0.0 if tau is None else float(np.exp(tau)),
-            share=1.0 / (1.0 + math.exp(-clipped["share"])) if "share" in clipped else 1.0,
-            visit=float(np.exp(clipped["visit"])) if "visit" in clipped else 0.0,
-            by_row="successive" in clipped,
-        )
+        scale = math.exp(clipped.get("scale", 0.0))
+        visit = math.exp(clipped["visit"]) if "visit" in clipped else 0.0
+        by_row = "successive" in clipped or "walk-by-row" in clipped
+        step = clipped.get("walk", clipped.get("walk-by-row"))
+        if step is not None:
+            gap, tau = self._taking.usual_gap_s, WANDERED * self._taking.span_s
+            reach = math.exp(2.0 * step) * tau / (2.0 * gap)
+            wide = scale * math.sqrt(1.0 + reach)
+            return Noise(wide, tau, reach / (1.0 + reach), visit, by_row, math.exp(step))
+        log_tau = clipped.get("correlated", clipped.get("successive"))
+        share = 1.0 / (1.0 + math.exp(-clipped["share"])) if "share" in clipped else 1.0
+        return Noise(scale, 0.0 if log_tau is None else math.exp(log_tau), share, visit, by_row)
 
     def of(self, noise: Noise) -> float:
         whitening = Whitening(self._taking, noise)
@@ -131,15 +139,18 @@ def estimate(problem: LinearProblem, taking: Taking, *, least: float = DEMANDED)
     if not taking.alike:
         left = [part for part in left if part not in TIED]
     while left:
-        offers = {part: _joined(likelihood, now, part) for part in left}
+        fading = [part for part in left if part not in WANDERING]
+        offers = {part: _joined(likelihood, now, part) for part in fading}
+        if any(now.value - offers[part].value > least for part in FADING if part in offers):
+            offers |= {part: _joined(likelihood, now, part) for part in WANDERING}
         rise = {part: now.value - offer.value for part, offer in offers.items()}
-        best = max(left, key=lambda part: rise[part] - needed[part])
+        best = max(rise, key=lambda part: rise[part] - needed[part])
         if rise[best] <= needed[best]:
             break
         now, gains[best] = offers[best], rise[best]
-        taken = TIED if best in TIED else {best}
-        left = [part for part in left if part not in taken and rise[part] > FAINT]
-    if TIED & set(now.parts):
+        taken = TIED if best in TIED else (best,)
+        left = [part for part in rise if part not in taken and rise[part] > FAINT]
+    if set(FADING) & set(now.parts):
         wider = _joined(likelihood, now, "share")
         now = wider if now.value - wider.value > SHARED else now
     if not now.parts:
@@ -202,12 +213,14 @@ def _components(
     values = {
         "correlated": noise.tau_s,
         "successive": noise.tau_s,
+        "walk": noise.step,
+        "walk-by-row": noise.step,
         "visit": noise.visit,
-        "scale": noise.scale,
+        "scale": noise.narrow,
     }
     return tuple(
         Component(
-            "correlated" if part in TIED else part,
+            SAID.get(part, part),
             values[part],
             float(values[part] * spread[k]),
             _chance(gains[part]),

@@ -19,10 +19,11 @@ from mocks.simulate.run import simulate
 pytestmark = pytest.mark.long
 
 SIGMA_MM = 0.005
+DRIFT = {"tracker-drift.vx": 0.03, "tracker-drift.wz": 2e-5}
 
 
-def measured(hidden: dict[str, float], rho: float, seed: int) -> Rows:
-    """A run of the hexapod; its noise follows itself from reading to reading."""
+def measured(hidden: dict[str, float], rho: float, seed: int, *, walk: float = 0.0) -> Rows:
+    """A run of the hexapod; its noise follows itself from reading to reading, or wanders."""
     plan = RunPlan(machine="hexapod", seed=seed, poses=40, noise_mm=SIGMA_MM, hidden=Hidden(hidden))
     clean = simulate(plan)
     exact = parse_run(run_toml(clean), points_csv(clean), actuators=6)
@@ -33,6 +34,7 @@ def measured(hidden: dict[str, float], rho: float, seed: int) -> Rows:
     noise = rng.standard_normal((3, rows.count))
     for k in range(1, rows.count):
         noise[:, k] = rho * noise[:, k - 1] + np.sqrt(1.0 - rho**2) * noise[:, k]
+    noise += walk * np.cumsum(rng.standard_normal(noise.shape), axis=1)
     return replace(rows, position=quiet.position + SIGMA_MM * noise)
 
 
@@ -48,3 +50,12 @@ def test_correlated_noise_is_named_and_nothing_else_but_what_is_there(hidden, ex
     assert "the noise is correlated over" in noise_words(last)
     assert last.noise.components[0].name == "correlated"
     assert last.noise.components[0].p_value < 1e-6
+
+
+@pytest.mark.parametrize(("hidden", "expected"), [({}, ()), (DRIFT, ("tracker-drift",))])
+def test_a_wandering_tracker_and_one_that_drifts_are_told_apart(hidden, expected):
+    rows = measured(hidden, 0.0, seed=5, walk=0.0 if hidden else 0.3)
+    answer = Refitter(rows, catalogue(rows.machine))(()).run
+    assert answer.diagnosis.explained_by == expected
+    assert [one.name for one in answer.noise.components] == ([] if hidden else ["walk"])
+    assert ("the noise wanders by" in noise_words(answer)) == (not hidden)
