@@ -43,7 +43,7 @@ def write_residuals(
         If the file would lie in a run's folder.
     """
     outside_runs(path, runs)
-    why = {int(row): LACKS for row in np.flatnonzero(~model.usable)}
+    why = {int(row): LACKS for row in np.flatnonzero(model.lacking)}
     why.update({one.row: one.why for one in bad})
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(residuals_text(model, linear, why), encoding="utf-8", newline="\n")
@@ -61,7 +61,7 @@ def residuals_text(model: Model, linear: Linearised, why: dict[int, str]) -> str
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(HEADER)
-    for k in range(rows.count):
+    for k in np.flatnonzero(~rows.ghost).tolist():
         angular = rows.sensed is not None and bool(rows.sensed.angular[k])
         live = rows.live[:, k]
         off = np.where(live, (1e6 if angular else 1e3) * linear.residual[:, k], np.nan)

@@ -274,7 +274,7 @@ def _said(
         "worst": _worst(found),
         "not_in_model": list(lacking),
         "bad_readings": [_bad(found, one) for one in found.bad],
-        "left_out_readings": int((~found.model.usable).sum()),
+        "left_out_readings": int(found.model.lacking.sum()),
         "remarks": [*remarks, *moved],
         "record": plain_remarks(rows.remarks),
         "advice": _advice(rms, expected, log_p, bool(moved)),

@@ -38,11 +38,11 @@ def lines_of_fit(fit: Fit) -> list[ReadingLine]:
     rows, linear = fit.model.rows, fit.linear
     off = 1000.0 * np.einsum("kin,kn->in", linear.situation.frame_rotation, linear.residual)
     place = linear.situation.base_point
-    why = {int(row): "lacks a channel" for row in np.flatnonzero(~fit.model.usable)}
+    why = {int(row): "lacks a channel" for row in np.flatnonzero(fit.model.lacking)}
     why |= {one.row: one.why for one in fit.bad}
     return [
         ReadingLine(
-            number=k + 1,
+            number=number,
             name=_name(fit, k),
             line=int(rows.line[k]),
             pose=rows.pose_name[k],
@@ -54,7 +54,7 @@ def lines_of_fit(fit: Fit) -> list[ReadingLine]:
             place_mm=_three(place[:, k], bool(rows.placed[k])),
             left_out=why.get(k, ""),
         )
-        for k in range(rows.count)
+        for number, k in enumerate(np.flatnonzero(~rows.ghost).tolist(), start=1)
     ]
 
 

@@ -14,6 +14,12 @@ from calib.identify.fitting import Fit
 from calib.mechanism.axes import units_of
 from calib.mechanism.rigid import rotate
 
+TOLD_APART = 100.0
+"""Condition, actuators scaled alike, up to which the readings of a pose tell its actuators apart.
+
+Three nests of a hexapod give some 20, of an arm 12 to 40; heights and marks by the hundred.
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class PoseResidual:
@@ -154,9 +160,11 @@ def pose_residuals(fit: Fit) -> PoseResidual:
     for number, members in enumerate(poses):
         shift[:, number] = base[:, members].mean(axis=1)
         own = columns[:, :, members].reshape(n, -1)
-        if own.shape[1] >= n and np.linalg.cond(own @ own.T) < 1e10:
+        normal = own @ own.T
+        size = np.sqrt(np.diag(normal))
+        if np.all(size > 0.0) and np.linalg.cond(normal / np.outer(size, size)) < TOLD_APART:
             whitened = fit.linear.whitened[:, members].reshape(-1)
-            extension[:, number] = np.linalg.solve(own @ own.T, own @ whitened)
+            extension[:, number] = np.linalg.solve(normal, own @ whitened)
     first = [members[0] for members in poses]
     return PoseResidual(
         names=tuple(rows.pose_name[row] for row in first),

@@ -35,7 +35,7 @@ def fit_report(fit: Fit) -> dict[str, Any]:
         "unidentified": unidentified_groups(fit),
         "unidentified_words": unidentified_words(fit),
         "bad_readings": bad_readings(fit),
-        "left_out_readings": int((~fit.model.usable).sum()),
+        "left_out_readings": int(fit.model.lacking.sum()),
         "channels_left_aside": {
             name: why for run in fit.model.rows.runs for name, why in run.left_aside.items()
         },

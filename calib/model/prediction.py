@@ -145,8 +145,12 @@ class Model:
         if self.rows.sensed is not None:
             far = np.flatnonzero(self.rows.sensed.partner >= 0)
             usable[far] &= usable[self.rows.sensed.partner[far]]
-            usable &= ~self.rows.sensed.ghost
-        return usable
+        return usable & ~self.rows.ghost
+
+    @property
+    def lacking(self) -> BoolArray:
+        """Readings (N,) that lack a channel of an effect."""
+        return ~self.usable & ~self.rows.ghost
 
     @cached_property
     def states(self) -> tuple[IntArray, IntArray]:

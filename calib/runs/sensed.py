@@ -242,7 +242,7 @@ class _Listed:
             "axis": sensing.axis[:, rows],
             "second": np.array([nests[name] for name in second_name]).reshape(-1, 3).T,
             "second_name": second_name,
-            "plane": self._plane(setup, [sensing.plane[row] for row in rows]),
+            "plane": self._plane(run, setup, [sensing.plane[row] for row in rows]),
             "zero": self._zero(index, setup, kind, instrument),
             "scale": self._scale(index, setup, kind, instrument),
             "attitude": sensing.attitude[:, :, rows],
@@ -286,12 +286,25 @@ class _Listed:
             frame[row] = own[name]
         return frame
 
-    def _plane(self, setup: Setup, names: Sequence[str]) -> IntArray:
+    def _plane(self, run: Run, setup: Setup, names: Sequence[str]) -> IntArray:
         listed = list(self.planes)
         for name in dict.fromkeys(names):
-            if name and name not in self.planes:
-                self.planes[name] = NamedPlane(name, setup.planes[name])
+            if not name:
+                continue
+            plane = setup.planes[name]
+            if name not in self.planes:
+                self.planes[name] = NamedPlane(name, plane)
                 listed.append(name)
+            known = self.planes[name].plane
+            if not (
+                np.array_equal(known.normal, plane.normal)
+                and np.array_equal(known.through, plane.through)
+            ):
+                raise BadInput(
+                    f"the plane {name} lies elsewhere than in the runs before",
+                    place=run.source,
+                    remedy="Give it another name where it is another plane",
+                )
         return np.array([listed.index(name) if name else -1 for name in names], dtype=np.intp)
 
     def _zero(

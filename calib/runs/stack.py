@@ -185,6 +185,11 @@ class Rows:
         """Which base frame (N,) each reading is seen in: one a run, or of ``frames``."""
         return self.run if self.sensed is None else self.sensed.frame
 
+    @property
+    def ghost(self) -> BoolArray:
+        """Rows (N,) that are no readings: the second marks of distances between two poses."""
+        return np.zeros(self.count, dtype=bool) if self.sensed is None else self.sensed.ghost
+
     @cached_property
     def frames(self) -> tuple[FrameOf, ...]:
         """Base frames to be found: one for each instrument of a run with a frame of its own."""
