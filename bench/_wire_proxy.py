@@ -2,27 +2,31 @@
 
 import contextlib
 import random
+import select
 import socket
 import struct
 import threading
 import time
 from collections import Counter
 
-FAULTS = (
-    "delay", "split", "merge", "drop", "duplicate", "truncate", "corrupt", "stall", "reset",
-)  # fmt: skip
+HARMLESS = ("delay", "split", "merge")
+"""What a network does every day: nobody may notice."""
 ENDING = ("stall", "reset", "drop", "truncate", "duplicate", "corrupt")
 """Few links outlive these: they come seldom, or no session would come far."""
+HARM = 0.2
+"""How many faults are of the second kind."""
 STALL_S = 3.0
+HELD_S = 0.05
+"""So long what is to go with what follows waits for it: a network holds nothing back for ever."""
 
 
 class Proxy:
     """Between a program and ``host:port``; from :meth:`spoil` on some of the chunks are spoilt."""
 
-    def __init__(self, address: str, dice: random.Random) -> None:
+    def __init__(self, address: str, dice: random.Random, harm: float = HARM) -> None:
         host, _, port = address.rpartition(":")
         self._far = (host, int(port))
-        self._dice, self._share = dice, 0.0
+        self._dice, self._share, self._harm = dice, 0.0, harm
         self.faults: Counter[str] = Counter()
         self._lock = threading.Lock()
         self._open: set[socket.socket] = set()
@@ -53,7 +57,7 @@ class Proxy:
         with contextlib.suppress(OSError):
             while data := source.recv(4096):
                 fault = self._drawn()
-                if fault == "merge" and not held:
+                if fault == "merge" and not held and select.select([source], [], [], HELD_S)[0]:
                     held = data
                     continue
                 data, held = held + data, b""
@@ -69,9 +73,8 @@ class Proxy:
         with self._lock:
             if self._dice.random() >= self._share:
                 return ""
-            fault = self._dice.choice(FAULTS)
-            if fault in ENDING and self._dice.random() < 0.7:
-                fault = self._dice.choice(FAULTS[:3])
+            harms = self._dice.random() < self._harm
+            fault = self._dice.choice(ENDING if harms else HARMLESS)
             self.faults[fault] += 1
             return fault
 

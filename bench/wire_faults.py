@@ -35,7 +35,7 @@ from app.session.journal import Journal
 from app.session.plans import PlanOptions, measure_plan, order_for
 from app.session.session import Session
 from bench._reliability_page import Row, write_row
-from bench._wire_proxy import Proxy
+from bench._wire_proxy import HARM, Proxy
 from drivers.errors import DeviceError
 
 POSES: dict[str, Pose] = {
@@ -95,7 +95,7 @@ async def measured(site: Site, root: Path, proxy: Proxy | None, share: float) ->
             print(f"closing took {time.monotonic() - begun:.1f} s")
 
 
-def _truth(folder: Path) -> Path:
+def truth_in(folder: Path) -> Path:
     """A folder with the parameters of a mock that is as it was drawn."""
     folder.mkdir()
     path = folder / "truth.json"
@@ -117,7 +117,7 @@ WHERE = {"tracker": "tracker_there", "controller": "controller"}
 """Where a site keeps what is on a link."""
 
 
-def behind(site: Site, link: str, dice: random.Random) -> tuple[Site, Proxy]:
+def behind(site: Site, link: str, dice: random.Random, harm: float = HARM) -> tuple[Site, Proxy]:
     """The site with a proxy in one of its links."""
     part = site.tracker if link == "tracker" else site.controller
     key, value = next(
@@ -125,7 +125,7 @@ def behind(site: Site, link: str, dice: random.Random) -> tuple[Site, Proxy]:
         if isinstance(value, str) and ":" in value and part.address.endswith(value)
     )  # fmt: skip
     far = value.removeprefix("socket://")
-    proxy = Proxy(far, dice)
+    proxy = Proxy(far, dice, harm)
     settings = {**part.settings, key: value.replace(far, proxy.address)}
     changed = replace(part, settings=settings, address=part.address.replace(far, proxy.address))
     return replace(site, **{WHERE[link]: changed}), proxy
@@ -144,7 +144,7 @@ def over_tcp(file: Path, port: int) -> Site:
     return load_site(file)
 
 
-def _free_port() -> int:
+def free_port() -> int:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         return int(taken.getsockname()[1])
 
@@ -164,8 +164,8 @@ class Trial:
         """Measure once as it is, then spoilt, until there were enough faults."""
         options = self.options
         dice = random.Random(f"{options.seed} {options.link} {options.machine} {number}")
-        port = _free_port()
-        words = ["--truth", str(_truth(folder)), "--controller-port", str(port)]
+        port = free_port()
+        words = ["--truth", str(truth_in(folder)), "--controller-port", str(port)]
         words += [f"--{options.kind}"] if options.kind else []
         words += ["--smrs", "1", "--no-base-smrs"] if options.kind == "lines" else []  # it sees one
         scale = SLOW.get(options.kind, SCALE)

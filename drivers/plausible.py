@@ -5,7 +5,8 @@ beyond what any instrument of its kind can read is refused here; what is merely 
 at where more is known, against the commanded pose and against the other readings of a dwell.
 """
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Mapping
 
 from drivers.errors import ProtocolError
 
@@ -21,6 +22,8 @@ WEATHER = {
     "humidity": (0.0, 110.0),
 }
 """deg C, hPa, % of what sensors of air and structure can read."""
+CHANNEL = 1e5
+"""No channel of a controller reads more, in either direction: deg C, kg, and what else there is."""
 
 
 def place(xyz: Iterable[float], device: str, farthest_mm: float = FARTHEST_MM) -> None:
@@ -41,6 +44,16 @@ def weather(what: str, value: float, device: str) -> float:
     """The value (``temperature``, ``pressure``, ``humidity``), or ProtocolError if it is none."""
     between((value,), *WEATHER[what], what, device)
     return value
+
+
+def channels(values: Mapping[str, float], device: str) -> None:
+    """Raise ProtocolError for a channel's value that is none; a sensor that is not there is.
+
+    A sensor's own sign that it is missing (nan, -127, 850, 6553.5) is another's to judge.
+    """
+    for name, value in values.items():
+        if not math.isnan(value):
+            between((value,), -CHANNEL, CHANNEL, name, device)
 
 
 def between(values: Iterable[float], low: float, high: float, what: str, device: str) -> None:

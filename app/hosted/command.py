@@ -98,7 +98,11 @@ class Commander:
         """
         commands = self.commands([tuple(pose)])
         if why := commands.refused[0]:
-            raise Refused(f"the pose is refused: {why}", remedy="Choose another pose")
+            raise Refused(
+                f"the pose is refused: {why}",
+                device="host's computation",
+                remedy="Choose another pose",
+            )
         found: Array = commands.extension[:, 0]
         return found
 
@@ -114,7 +118,9 @@ class Commander:
         for pose in poses:
             if len(pose) != count or not np.all(np.isfinite(pose)):
                 raise Refused(
-                    f"{tuple(pose)} is no pose: {count} finite numbers are", remedy="Command one"
+                    f"{tuple(pose)} is no pose: {count} finite numbers are",
+                    device="host's computation",
+                    remedy="Command one",
                 )
         identified, channels, self.left = self._in_these_conditions()
         begins = self._clock() + self._travel_s
@@ -124,7 +130,7 @@ class Commander:
         try:
             return commands_for(identified, np.array(poses, float).T, around, history)
         except BadInput as error:
-            raise Refused(error.what, remedy=error.remedy) from error
+            raise Refused(error.what, device="host's computation", remedy=error.remedy) from error
 
     def _in_these_conditions(self) -> tuple[Identified, dict[str, float], tuple[str, ...]]:
         """The machine, every channel that its effects need, and what nobody tells.

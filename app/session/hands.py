@@ -110,7 +110,11 @@ class MockControl:
             )
         answer: dict[str, Any] = json.loads(line)
         if not answer.get("ok", False):
-            raise Refused(str(answer.get("error", answer)), device=device)
+            raise Refused(
+                str(answer.get("error", answer)),
+                device=device,
+                remedy="See which nests and SMRs the mock has: pkmcal mock --help",
+            )
         return answer
 
 
@@ -125,5 +129,6 @@ def nobody_to_ask(text: str) -> NoTarget:
     """What an unattended session says where a person is needed."""
     return NoTarget(
         f"a person is needed: {text}",
+        device="operator",
         remedy="Run in a terminal, or say in the site file who carries SMRs ([hands])",
     )

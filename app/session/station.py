@@ -36,7 +36,9 @@ class Devices:
     def measuring(self) -> Tracker | Gauge:
         """What measures; raises :class:`ConnectFailed` where nothing does."""
         if (there := self.tracker or self.gauge) is None:
-            raise ConnectFailed("nothing that measures is connected", remedy="Connect first")
+            raise ConnectFailed(
+                "nothing that measures is connected", device="tracker", remedy="Connect first"
+            )
         return there
 
 
@@ -70,14 +72,18 @@ class Station:
     def tracker(self) -> Tracker:
         """The tracker; raises :class:`ConnectFailed` while not connected."""
         if (there := self._need().tracker) is None:
-            raise ConnectFailed("no tracker is connected", remedy="This site has a gauge")
+            raise ConnectFailed(
+                "no tracker is connected", device="tracker", remedy="This site has a gauge"
+            )
         return there
 
     @property
     def gauge(self) -> Gauge:
         """The gauge; raises :class:`ConnectFailed` while not connected."""
         if (there := self._need().gauge) is None:
-            raise ConnectFailed("no gauge is connected", remedy="This site has a tracker")
+            raise ConnectFailed(
+                "no gauge is connected", device="gauge", remedy="This site has a tracker"
+            )
         return there
 
     @property
@@ -92,7 +98,9 @@ class Station:
 
     def _need(self) -> Devices:
         if self._devices is None:
-            raise ConnectFailed("the devices are not connected", remedy="Connect first")
+            raise ConnectFailed(
+                "the devices are not connected", device="station", remedy="Connect first"
+            )
         return self._devices
 
     async def connect(self) -> None:

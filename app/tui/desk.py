@@ -106,7 +106,9 @@ class Desk:
         station = self._need_station()
         if self.mock is not None and self.mock.ended:
             raise ConnectFailed(
-                "the mock station that was started here has ended", remedy="Start another one (m)"
+                "the mock station that was started here has ended",
+                device="mock station",
+                remedy="Start another one (m)",
             )
         self._connecting = True
         try:

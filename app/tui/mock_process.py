@@ -44,7 +44,11 @@ class MockProcess:
                 line = await process.stdout.readline()
         except TimeoutError as error:
             await _end(process)
-            raise Silence(f"said nothing within {START_S:.0f} s", device=DEVICE) from error
+            raise Silence(
+                f"said nothing within {START_S:.0f} s",
+                device=DEVICE,
+                remedy="Start it again; a busy computer is slow",
+            ) from error
         if not line:
             said = await _last_words(process)
             await _end(process)

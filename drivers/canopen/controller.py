@@ -20,8 +20,9 @@ from drivers.canopen.link import BusAddress, CanLink
 from drivers.canopen.machine_bus import MachineBus
 from drivers.canopen.motion import MOVE_TO_POSE, MOVE_TO_Q, PREPARE
 from drivers.canopen.parameter_access import ParameterAccess
-from drivers.errors import LinkError, Refused, Silence
+from drivers.errors import Refused, Silence
 from drivers.interface import ActuatorState, Alarm, ControllerCan, ControllerState, Identity
+from drivers.stopping import STILL_MOVING, confirmed
 
 T = TypeVar("T")
 ANSWER_DEADLINE_S = 2.0
@@ -274,25 +275,20 @@ class CanopenController:
 
         The frames go out at once, past every SDO transfer under way. The drives brake and switch
         off; :meth:`enable` brings them back. Raises LinkLost if the frames cannot be sent, Silence
-        if the machine does not come to rest.
+        if the machine does not come to rest, HeartbeatLost of a drive that cannot be asked.
         """
         again, self._stopped = self._stopped, True
-        try:
+        async with confirmed(again):
             await self._bus.send_stop()
             await self._rest()
-        except LinkError as error:
-            if not again:
-                raise type(error)(
-                    f"the stop was not confirmed ({error.what})",
-                    device=error.device,
-                    remedy="Use the emergency stop. Drives stop by themselves without the PC.",
-                ) from error
 
     async def _rest(self) -> None:
         deadline = time.monotonic() + ANSWER_DEADLINE_S
         while (await self._motion.refresh()).moving:
             if time.monotonic() > deadline:
-                raise Silence("the machine is still moving", device=self._device)
+                raise Silence(
+                    "the machine is still moving", device=self._device, remedy=STILL_MOVING
+                )
             await asyncio.sleep(0.005)
 
     # ------------------------------------------------------------ parameters

@@ -23,6 +23,7 @@ def eds_path(name: str) -> Path:
         known = ", ".join(sorted(p.stem for p in EDS_FOLDER.glob("*.eds")))
         raise DeviceError(
             f"no EDS file named {name!r}",
+            device="controller",
             remedy=f"Those that ship are {known}. Write one of your own machine with pkmcal "
             "machine eds MACHINE, and name its path in the site file: eds = ... in [controller].",
         )

@@ -24,7 +24,7 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from drivers.canopen.eds import dictionary
 from drivers.canopen.reader import FrameReader
-from drivers.canopen.sdo_abort import REMEDIES, abort_words
+from drivers.canopen.sdo_abort import REMEDIES, UNUSUAL, abort_words
 from drivers.canopen.slcan_bus import open_bus
 from drivers.errors import (
     ConnectFailed,
@@ -210,7 +210,7 @@ class CanLink:
                 raise Refused(
                     abort_words(error.code),
                     device=self.label(node_id),
-                    remedy=REMEDIES.get(error.code, ""),
+                    remedy=REMEDIES.get(error.code, UNUSUAL),
                     code=error.code,
                 ) from error
             except SdoCommunicationError as error:
@@ -230,11 +230,11 @@ class CanLink:
             remedy="Check that the device is switched on.",
         )
 
-    def _lost(self, error: BaseException) -> LinkLost:
+    def _lost(self, error: BaseException | str) -> LinkLost:
         return LinkLost(f"the link is gone ({error})", device=self.name, remedy=REMEDY_LINK)
 
     def _gone(self, why: str) -> None:
-        self.latch("link", self._lost(LinkLost(why)))
+        self.latch("link", self._lost(why))
 
     def _damaged(self, count: int, what: str) -> None:
         self.in_loop(self.on_damaged, count, what)

@@ -16,8 +16,9 @@ from drivers.canopen.drive402 import (
     state_name,
 )
 from drivers.canopen.link import CanLink, Device
-from drivers.errors import ConnectFailed, DeviceError, HeartbeatLost, LinkError, LinkLost, Silence
+from drivers.errors import ConnectFailed, DeviceError, HeartbeatLost, LinkLost, Silence
 from drivers.interface import Alarm
+from drivers.stopping import STILL_MOVING
 
 FIRST_HEARTBEAT_S = 2.0
 FAREWELL_DEADLINE_S = 1.0
@@ -137,10 +138,11 @@ class Nodes:
     async def _halt(self) -> None:
         try:
             await self.send_stop()
-        except LinkError as error:
+        except DeviceError as error:
             if "link" in self.link.faults:
                 return  # which says that the machine stops by itself
-            self.alarm(Alarm(error.device, f"the stop could not be sent: {error.what}", fault=True))
+            what = f"the stop could not be sent: {error.what}"
+            self.alarm(Alarm(error.device, what, STILL_MOVING, fault=True))
 
     async def send_stop(self, controlword: int = QUICK_STOP) -> None:
         """Send ``controlword`` to every drive; raises LinkLost.

@@ -34,6 +34,8 @@ REMEDIES = {
     0x0800_0022: "Disable motion first, then try again.",
 }
 
+UNUSUAL = "See its manual; switch it off and on, and try again."
+
 
 def abort_words(code: int) -> str:
     """Return what an abort code means, with the code."""

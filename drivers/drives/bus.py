@@ -19,7 +19,7 @@ from drivers.drives.recognise import check_eds, recognise, together
 from drivers.drives.set_up import SetUp
 from drivers.drives.sync import take_setpoints
 from drivers.drives.units import counts_of
-from drivers.errors import ConnectFailed, DeviceError, DeviceFault, LinkError, Refused, Silence
+from drivers.errors import ConnectFailed, DeviceError, DeviceFault, Refused, Silence
 from drivers.interface import Alarm, Identity
 
 
@@ -113,7 +113,7 @@ class DriveBus(Nodes):
         drive = next(drive for drive in self.drives if drive.remote.id == node_id)
         try:
             state = state_name(await drive.read(STATUSWORD))
-        except (LinkError, Refused):
+        except DeviceError:  # lost meanwhile, for example
             state = "fault"
         if state.startswith("fault"):
             self.latch_drive(node_id, code)

@@ -25,8 +25,9 @@ from drivers.drives.rest import at_rest
 from drivers.drives.sync import must_take_setpoints
 from drivers.drives.targets import in_counts, table_of
 from drivers.drives.travel import Travel
-from drivers.errors import DeviceError, LinkError, Refused
+from drivers.errors import DeviceError, Refused
 from drivers.interface import ActuatorState, Alarm, ControllerCan, ControllerState, Identity
+from drivers.stopping import confirmed
 
 HOMING_DEADLINE_S = 120.0
 
@@ -310,20 +311,13 @@ class DriveMotors:
 
         Whole frames go out at once, past every SDO transfer under way. The drives brake as 0x605A
         says; :meth:`enable` brings them back. Raises LinkLost if the frames cannot be sent, Silence
-        if the machine does not come to rest.
+        if the machine does not come to rest, HeartbeatLost of a drive that cannot be asked.
         """
         again, self._stopped = self._stopped, True
-        try:
+        async with confirmed(again):
             await self._bus.send_stop()
             self._end_stream()
             await at_rest(self._bus, self.state)
-        except LinkError as error:
-            if not again:
-                raise type(error)(
-                    f"the stop was not confirmed ({error.what})",
-                    device=error.device,
-                    remedy="Use the emergency stop. Drives stop by themselves without the PC.",
-                ) from error
 
     # ------------------------------------------------------------ the end
 

@@ -7,6 +7,7 @@ from collections.abc import Awaitable, Callable
 from drivers.drives.bus import DriveBus
 from drivers.errors import Silence
 from drivers.interface import ControllerState
+from drivers.stopping import STILL_MOVING
 
 REST_DEADLINE_S = 3.0
 POLL_S = 0.01
@@ -30,7 +31,9 @@ async def at_rest(bus: DriveBus, state: Callable[[], Awaitable[ControllerState]]
         if still and not on:
             return
         if time.monotonic() > deadline:
-            raise Silence("the machine is still moving, or has power", device="drives")
+            raise Silence(
+                "the machine is still moving, or has power", device="drives", remedy=STILL_MOVING
+            )
         if on:
             await bus.send_stop()
         before = now

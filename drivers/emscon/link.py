@@ -125,8 +125,8 @@ class EmsconLink:
             self._break(self._gone(f"the tracker closed the connection{torn}"))
         except OSError as error:
             self._break(self._gone(f"the connection broke ({error})"))
-        except DeviceError as error:
-            self._break(error)
+        except DeviceError as error:  # of the parser, which does not know whose bytes they are
+            self._break(type(error)(error.what, device=self.device, remedy=error.remedy))
 
     def _gone(self, what: str) -> LinkError:
         remedy = "Check the tracker and the network, then reconnect."
@@ -150,7 +150,10 @@ class EmsconLink:
         if packet.type == PacketType.ERROR or packet.status != 0:
             name = wire.BY_CODE[pending.code].name
             refused = Refused(
-                f"{name}: {status_words(packet.status)}", device=self.device, code=packet.status
+                f"{name}: {status_words(packet.status)}",
+                device=self.device,
+                remedy="See what the tracker's own program says; its state may forbid it.",
+                code=packet.status,
             )
             pending.done.set_exception(refused)
         elif packet.type == PacketType.COMMAND:
@@ -171,7 +174,11 @@ class EmsconLink:
         """Release the connection; never raises."""
         self._closing = True
         if self.lost is None:
-            self.lost = LinkLost("the connection was closed by this program", device=self.device)
+            self.lost = LinkLost(
+                "the connection was closed by this program",
+                device=self.device,
+                remedy="Connect again.",
+            )
         if self._pending is not None and not self._pending.done.done():
             self._pending.done.set_exception(self.lost)
         self._task.cancel()

@@ -35,6 +35,7 @@ from drivers.interface import (
     TrackerState,
     TrackSample,
 )
+from drivers.stopping import stopped
 
 INITIALIZE_S = 90.0
 POINT_S = 60.0
@@ -313,13 +314,15 @@ class EmsconTracker:
     async def stop(self) -> None:
         """End any measurement; never raises for a second call."""
         if self._measurement is not None:
-            self._measurement.fail(BeamBroken("stopped by the operator", device=self._link.device))
+            self._measurement.fail(stopped(BeamBroken, self._link.device))
             await self._abort()
 
     async def close(self) -> None:
         """Release the link; never raises."""
         if self._measurement is not None:
-            closed = LinkLost("the connection was closed", device=self._link.device)
+            closed = LinkLost(
+                "the connection was closed", device=self._link.device, remedy="Connect again."
+            )
             self._measurement.fail(closed)
         await self._link.close()
 

@@ -309,7 +309,10 @@ def parse_request(packet: bytes) -> Packet:
     """Take a command apart, as the tracker sees it; raises ProtocolError for anything else."""
     kind = _HEADER.unpack_from(packet)[1]
     if kind != PacketType.COMMAND:
-        raise ProtocolError(f"packet of type {kind} where a command belongs")
+        raise ProtocolError(
+            f"packet of type {kind} where a command belongs",
+            remedy="Look at the program that sends it: a tracker hears commands only.",
+        )
     code = _words(packet, 1)[0]
     known = BY_CODE.get(code)
     return Packet(kind, code, fields=known.request.unpack(packet) if known is not None else {})

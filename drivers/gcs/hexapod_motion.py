@@ -10,11 +10,12 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from drivers.errors import DeviceError, DeviceFault, DriveFault, LinkError, Refused, Silence
+from drivers.errors import DeviceError, DeviceFault, DriveFault, Refused, Silence
 from drivers.gcs.answers import numbers
 from drivers.gcs.errors import NOT_ENABLED, STARTING, UNKNOWN_COMMAND
 from drivers.gcs.line import ANSWER_S, Line
 from drivers.gcs.link import GcsLink
+from drivers.stopping import STILL_MOVING, confirmed, within
 
 T = TypeVar("T")
 REFERENCE_S, REST_S, STOP_S, POLL_S = 120.0, 1.5, 2.5, 0.01
@@ -238,29 +239,17 @@ class HexapodMotion:
     async def stop(self) -> None:
         """Send #24 and wait for rest; never raises for a second call."""
         again, self._stopped = self._stopped, True
-        try:
-            async with asyncio.timeout(STOP_S):
-                await self._link.stop()
-                await self._rest()
-        except TimeoutError as error:
-            if not again:
-                raise self._unconfirmed(Silence, f"no answer within {STOP_S} s") from error
-        except LinkError as error:
-            if not again:
-                raise self._unconfirmed(type(error), error.what) from error
-
-    def _unconfirmed(self, kind: type[LinkError], why: str) -> LinkError:
-        return kind(
-            f"the stop was not confirmed ({why})",
-            device=self._device,
-            remedy="Use the emergency stop.",
-        )
+        async with confirmed(again, STILL_MOVING), within(STOP_S, self._device):
+            await self._link.stop()
+            await self._rest()
 
     async def _rest(self) -> None:
         deadline = time.monotonic() + REST_S
         while await self._link.call(lambda line: line.moving()):
             if time.monotonic() > deadline:
-                raise Silence("the machine is still moving", device=self._device)
+                raise Silence(
+                    "the machine is still moving", device=self._device, remedy=STILL_MOVING
+                )
             await asyncio.sleep(POLL_S)
 
 

@@ -41,12 +41,14 @@ def _convention(settings: Mapping[str, Any]) -> Convention | None:
     if count != 6:
         raise Refused(
             f"pose_axes names {count} axes; a platform has 3, or 6 where it turns",
+            device="controller",
             remedy="Correct pose_axes under [controller] of the site file",
         )
     missing = [name for name in ("angle_unit", "rotation") if not settings[name]]
     if missing:
         raise Refused(
             f"pose_axes names angles, and {' and '.join(missing)} is not stated",
+            device="controller",
             remedy="Write angle_unit and rotation under [controller] of the site file",
         )
     return Convention(settings["rotation"], settings["angle_unit"] == "deg")

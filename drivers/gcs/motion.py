@@ -5,13 +5,14 @@ import math
 import time
 from collections.abc import Mapping
 
-from drivers.errors import DeviceFault, LinkError, Refused, Silence
+from drivers.errors import DeviceFault, Refused, Silence
 from drivers.gcs.answers import numbers
 from drivers.gcs.axes import MOVING, ON_TARGET, REFERENCING, SERVO, Axes
 from drivers.gcs.errors import NOT_ENABLED
 from drivers.gcs.line import ANSWER_S, Line
 from drivers.gcs.link import GcsLink
 from drivers.gcs.watch import Watch
+from drivers.stopping import BY_ITSELF, STILL_MOVING, confirmed, within
 
 REST_S, STOP_S, POLL_S = 1.5, 2.5, 0.005
 # What a solver may leave of an angle that is meant to be 0.
@@ -147,28 +148,16 @@ class Motion:
     async def stop(self, switch_off: str) -> None:
         """Send #24, wait for rest and send ``switch_off``; never raises for a second call."""
         again, self._stopped = self._stopped, True
-        try:
-            async with asyncio.timeout(STOP_S):
-                await self._link.stop()
-                await self._rest()
-                await self._link.call(lambda line: line.command(switch_off))
-        except TimeoutError as error:
-            if not again:
-                raise self._unconfirmed(Silence, f"no answer within {STOP_S} s") from error
-        except LinkError as error:
-            if not again:
-                raise self._unconfirmed(type(error), error.what) from error
-
-    def _unconfirmed(self, kind: type[LinkError], why: str) -> LinkError:
-        return kind(
-            f"the stop was not confirmed ({why})",
-            device=self._device,
-            remedy="Use the emergency stop. The controller stops by itself without the PC.",
-        )
+        async with confirmed(again, BY_ITSELF), within(STOP_S, self._device):
+            await self._link.stop()
+            await self._rest()
+            await self._link.call(lambda line: line.command(switch_off))
 
     async def _rest(self) -> None:
         deadline = time.monotonic() + REST_S
         while await self._link.call(lambda line: line.moving()):
             if time.monotonic() > deadline:
-                raise Silence("the machine is still moving", device=self._device)
+                raise Silence(
+                    "the machine is still moving", device=self._device, remedy=STILL_MOVING
+                )
             await asyncio.sleep(POLL_S)

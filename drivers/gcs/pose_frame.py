@@ -91,7 +91,11 @@ def need_unit(line: Line, axes: Sequence[str], degrees: bool) -> None:
     wanted = ["MM"] * 3 + ["DEG" if degrees else "RAD"] * 3
     for axis, unit in zip(axes, wanted, strict=True):
         if axis not in units:
-            raise ProtocolError(f"tells no unit of axis {axis}", device=line.device)
+            raise ProtocolError(
+                f"tells no unit of axis {axis}",
+                device=line.device,
+                remedy="Check pose_axes in the site file against the axes that it has.",
+            )
         if units[axis].upper() != unit:
             raise Refused(
                 f"counts axis {axis} in {units[axis]}, the site file in {unit.lower()}",

@@ -17,6 +17,7 @@ CONNECT_S = 5.0
 LONGEST_ANSWER = 4096
 READ_S = 0.05
 REMEDY = "Check the cable, the baud rate and that GeoCOM is on, then connect again."
+GARBLED = "Check cable and baud rate: what it sends arrives damaged; then measure again."
 _ANSWER = re.compile(r"%R1P,(\d+),(\d+)(?:,\d+)?:(\d+)(?:,(.*))?")
 
 
@@ -35,7 +36,9 @@ class Answer:
             found = ()
         if len(found) != count or not all(map(math.isfinite, found)):
             raise ProtocolError(
-                f"the answer {','.join(self.values)!r} is no numbers", device=device
+                f"the answer {','.join(self.values)!r} is no numbers",
+                device=device,
+                remedy=GARBLED,
             )
         return found
 
@@ -117,7 +120,9 @@ class GeoComLink:
                 continue
             found = _ANSWER.fullmatch(line)
             if found is None:
-                raise ProtocolError(f"the answer to {rpc.name} is {line!r}", device=self.device)
+                raise ProtocolError(
+                    f"the answer to {rpc.name} is {line!r}", device=self.device, remedy=GARBLED
+                )
             com, number, code, rest = found.groups()
             if int(number) != self._number:
                 continue  # a late answer to a request that was given up
@@ -139,7 +144,7 @@ class GeoComLink:
             self._rest += bytes(more)
             if len(self._rest) > LONGEST_ANSWER:
                 self._rest = b""
-                raise ProtocolError("an answer without an end", device=self.device)
+                raise ProtocolError("an answer without an end", device=self.device, remedy=GARBLED)
         line, _, self._rest = self._rest.partition(b"\n")
         return line.decode("latin-1").strip() or None
 
@@ -152,7 +157,8 @@ class GeoComLink:
 
     async def close(self) -> None:
         """Let go; never raises."""
-        self.fail(LinkLost("the connection was closed", device=self.device), say=False)
+        closed = "the connection was closed"
+        self.fail(LinkLost(closed, device=self.device, remedy="Connect again."), say=False)
         with contextlib.suppress(OSError):
             await asyncio.to_thread(self._port.close)
 

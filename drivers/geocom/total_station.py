@@ -21,6 +21,7 @@ from drivers.interface import (
     TrackerState,
     TrackSample,
 )
+from drivers.stopping import stopped
 
 MEASURE, CLEAR, AUTO = 1, 3, 1
 """Measurement programs (start, clear) and inclination by the instrument itself."""
@@ -119,7 +120,11 @@ class TotalStation:
         x, y, z = xyz
         reach = math.hypot(x, y, z)
         if not reach > 0.0:
-            raise Refused("the instrument cannot aim at itself", device=self._link.device)
+            raise Refused(
+                "the instrument cannot aim at itself",
+                device=self._link.device,
+                remedy="Correct frame under [tracker] in the site file.",
+            )
         horizontal, vertical = math.atan2(x, y), math.acos(z / reach)
         if (await self.state()).face == 2:
             horizontal, vertical = horizontal + math.pi, 2.0 * math.pi - vertical
@@ -162,7 +167,7 @@ class TotalStation:
         end = loop.time() + self._settings.edm_s / self._scale + 1.0
         while True:
             if self._stops != stops:
-                raise BeamBroken("stopped by the operator", device=self._link.device)
+                raise stopped(BeamBroken, self._link.device)
             wait_s = 1e-3 * POLL_MS / self._scale
             answer = await self._link.request(Rpc.TMC_GET_SIMPLE_MEA, POLL_MS, AUTO, wait_s=wait_s)
             if answer.code in WHOLE:
@@ -192,7 +197,11 @@ class TotalStation:
 
     def stream(self, separation_s: float) -> AsyncIterator[TrackSample]:
         """It has no continuous mode that is used here."""
-        raise Refused("there is no continuous mode", device=self._link.device)
+        raise Refused(
+            "there is no continuous mode",
+            device=self._link.device,
+            remedy="Measure point by point.",
+        )
 
     async def channels(self) -> dict[str, float]:
         """It measures nothing of the machine or the air."""
@@ -236,6 +245,7 @@ class TotalStation:
             raise Refused(
                 f"the instrument answers {in_words(answer.code)}",
                 device=self._link.device,
+                remedy="See what the instrument shows on its own screen, then measure again.",
                 code=answer.code,
             )
 

@@ -10,6 +10,7 @@ from drivers.interface import Alarm, GaugeCan, GaugeReading, GaugeState, Identit
 from drivers.lines.listener import Listener
 from drivers.lines.number import Number, NumberPattern
 from drivers.lines.source import Source
+from drivers.stopping import stopped
 
 LEAST_SAMPLES = 3
 """Lines of a stream that make a dwell at least."""
@@ -122,7 +123,7 @@ class LineGauge:
 
     async def stop(self) -> None:
         """End a reading that is waited for."""
-        self._lines.tell(LinkError("stopped by the operator", device=self._device))
+        self._lines.tell(stopped(LinkError, self._device))
 
     async def close(self) -> None:
         """Release the link; never raises."""

@@ -87,7 +87,8 @@ class Listener(Generic[Heard]):
 
     async def close(self) -> None:
         """Release the link; never raises."""
-        self._fail(LinkLost("the connection was closed", device=self._device), say=False)
+        closed = "the connection was closed"
+        self._fail(LinkLost(closed, device=self._device, remedy="Connect again."), say=False)
         self._task.cancel()
         await asyncio.wait([self._task], timeout=1.0)
         await self._source.close()

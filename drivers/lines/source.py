@@ -128,7 +128,7 @@ class SerialSource:
             while at := _ended(self._rest):
                 line, self._rest = self._rest[: at - 1], self._rest[at:].lstrip(b"\n")
                 yield line.decode("latin-1")
-        raise LinkLost("the port was closed", device=self._device)
+        raise LinkLost("the port was closed", device=self._device, remedy=REMEDY)
 
     def _read(self) -> bytes:
         return bytes(self._port.read(max(1, self._port.in_waiting)))
@@ -180,7 +180,7 @@ class FileSource:
                 yield line
             if not more:
                 await asyncio.sleep(LOOK_S)
-        raise LinkLost("the file was let go", device=self._device)
+        raise LinkLost("the file was let go", device=self._device, remedy=REMEDY)
 
     def _more(self) -> list[str]:
         """Whole lines that have come; a line that is being written waits for its end."""

@@ -18,6 +18,7 @@ from drivers.interface import (
 from drivers.lines.listener import Listener
 from drivers.lines.reading import LinePattern, Reading
 from drivers.lines.source import Source
+from drivers.stopping import stopped
 
 LEAST_SAMPLES = 3
 """Lines of a stream that make a dwell at least."""
@@ -166,7 +167,7 @@ class LineTracker:
 
     async def stop(self) -> None:
         """End a dwell."""
-        self._lines.tell(BeamBroken("stopped by the operator", device=self._device))
+        self._lines.tell(stopped(BeamBroken, self._device))
 
     async def close(self) -> None:
         """Release the link; never raises."""
@@ -189,7 +190,11 @@ class LineTracker:
         raise self._cannot("change its face")
 
     def _cannot(self, what: str) -> Refused:
-        return Refused(f"an instrument that only sends lines cannot {what}", device=self._device)
+        return Refused(
+            f"an instrument that only sends lines cannot {what}",
+            device=self._device,
+            remedy="Do it by hand.",
+        )
 
     def _read(self, line: str) -> Reading | DeviceError | None:
         """What a line says: a reading, that there was none, or nothing."""

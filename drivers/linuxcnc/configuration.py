@@ -48,7 +48,11 @@ class Ini:
         try:
             return float(text.split("#")[0])
         except ValueError:
-            raise Refused(f"{said} is {text!r}, no number", device=str(self.path)) from None
+            raise Refused(
+                f"{said} is {text!r}, no number",
+                device=str(self.path),
+                remedy="Write a number there, then start LinuxCNC again.",
+            ) from None
 
     @property
     def hal_files(self) -> list[Path]:
@@ -120,6 +124,7 @@ def with_entries(text: str, values: Mapping[tuple[str, str], float]) -> str:
         if section not in heads:
             raise ParameterError(
                 f"there is no [{section}] in the INI file, where {key} is to be stored",
+                device="LinuxCNC",
                 remedy="Write it into the INI file itself, not into an included one",
             )
         lines.insert(heads[section], f"{key} = {value!r}")

@@ -14,6 +14,8 @@ from drivers.errors import ConnectFailed, LinkLost, ProtocolError, Refused, Sile
 HELPER = Path(__file__).with_name("helper.py")
 START_S, END_S = 10.0, 2.0
 LONGEST_LINE = 1 << 20
+AGAIN = "See whether LinuxCNC hangs, then connect again."
+ITS_SCREEN = "See what LinuxCNC says on its own screen."
 Answer = Mapping[str, Any]
 
 
@@ -105,12 +107,12 @@ class LinuxCncLink:
                 raise self._lost() from error
             found = await self._line(within_s or self._answer_s)
         if found.get("id") != self._number:
-            raise ProtocolError(f"the helper answered {found}", device=self.device)
+            raise ProtocolError(f"the helper answered {found}", device=self.device, remedy=AGAIN)
         self._said += found.get("said", [])
         if not found.get("alive"):
             raise self._lost()
         if not found.get("ok"):
-            raise Refused(str(found.get("error")), device=self.device)
+            raise Refused(str(found.get("error")), device=self.device, remedy=ITS_SCREEN)
         return found
 
     async def _line(self, within_s: float) -> dict[str, Any]:
@@ -120,13 +122,17 @@ class LinuxCncLink:
                 line = await self._process.stdout.readline()
         except TimeoutError:
             self._kill()
-            raise Silence(f"no answer within {within_s:g} s", device=self.device) from None
+            raise Silence(
+                f"no answer within {within_s:g} s", device=self.device, remedy=AGAIN
+            ) from None
         if not line:
             raise self._lost()
         try:
             found: dict[str, Any] = json.loads(line)
         except ValueError as error:
-            raise ProtocolError(f"the helper wrote {line[:80]!r}", device=self.device) from error
+            raise ProtocolError(
+                f"the helper wrote {line[:80]!r}", device=self.device, remedy=AGAIN
+            ) from error
         return found
 
     def _lost(self) -> LinkLost:

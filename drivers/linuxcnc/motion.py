@@ -5,7 +5,7 @@ import math
 
 from drivers.errors import DeviceFault, DriveFault, Refused
 from drivers.kind import Surroundings
-from drivers.linuxcnc.link import Answer, Ask
+from drivers.linuxcnc.link import ITS_SCREEN, Answer, Ask
 from drivers.linuxcnc.parameter_access import POWER_S, ParameterAccess
 from drivers.linuxcnc.places import Places
 from drivers.linuxcnc.rotation import matrix
@@ -183,7 +183,7 @@ class Motion:
             await asyncio.sleep(POLL_S)
         if self._said:
             said = "; ".join(self._said)
-            raise DeviceFault(f"stopped on the way: {said}", device=self._device)
+            raise DeviceFault(f"stopped on the way: {said}", device=self._device, remedy=ITS_SCREEN)
         await self._compare(stops, state)
 
     async def _compare(self, stops: int, state: Answer) -> None:
@@ -213,7 +213,11 @@ class Motion:
         """The state, unless a fault stands or the motion was stopped."""
         self.check()
         if self._stops != stops:
-            raise DeviceFault("the motion was stopped", device=self._device)
+            raise DeviceFault(
+                "the motion was stopped",
+                device=self._device,
+                remedy="Enable the machine and command the pose again.",
+            )
         state = await self._ask("state")
         self._watch.look(state)
         self.check()

@@ -7,6 +7,7 @@ from drivers.errors import LinkError, Refused
 from drivers.interface import Alarm, GaugeCan, GaugeReading, GaugeState, Identity
 from drivers.lines.number import UNITS
 from drivers.operator.asked import unless_stopped
+from drivers.stopping import stopped
 
 AskNumber = Callable[[str, str], Awaitable[str]]
 """Brings a question to the person: what was wrong before (or nothing), and what is to be typed."""
@@ -74,7 +75,7 @@ class PersonReads:
         said = await unless_stopped(ask(wrong, f"the number in {self._unit}"), self._stopped)
         if said is not None:
             return said
-        raise LinkError("stopped by the operator", device=self.identity.product)
+        raise stopped(LinkError, self.identity.product)
 
     async def stop(self) -> None:
         """Nobody is waited for any more."""

@@ -63,7 +63,11 @@ class PersonMoves:
     async def enable(self) -> None:
         """Let moves be asked for; raises LinkLost after the end."""
         if self._closed:
-            raise LinkLost("the session with the operator has ended", device=self.identity.kind)
+            raise LinkLost(
+                "the session with the operator has ended",
+                device=self.identity.kind,
+                remedy="Connect again.",
+            )
         self._enabled = True
 
     async def disable(self) -> None:

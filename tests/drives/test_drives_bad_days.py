@@ -1,6 +1,7 @@
 """What real drives do, and what goes wrong with them: everything ends at rest and in words."""
 
 import asyncio
+import gc
 import time
 from collections.abc import Callable
 
@@ -8,7 +9,7 @@ import can
 import pytest
 from bare_lab import FAR, HOME, SHORT
 
-from drivers.errors import DeviceFault, DriveFault, HeartbeatLost, Refused
+from drivers.errors import DeviceError, DeviceFault, DriveFault, HeartbeatLost, Refused
 from mocks.canopen.bare_drive import LATE_MODE_S, LATE_RESET_S
 from mocks.canopen.state402 import State
 
@@ -105,6 +106,23 @@ async def test_a_drive_without_a_pdo_for_its_controlword_is_stopped_by_sdo(bare)
     await until(lambda: bare.moving)
     await motors.stop()
     assert not bare.moving
+
+
+async def test_a_stop_by_sdo_that_a_lost_drive_does_not_hear_is_told(bare):
+    for number in range(1, 7):
+        bare.drive(number).keep(0x1400, 1, 0x8000_0200 + number)
+    unseen: list[dict] = []
+    asyncio.get_running_loop().set_exception_handler(lambda _, context: unseen.append(context))
+    motors = await bare.ready(silence_s=SHORT)
+    bare.world.faults.inject("heartbeat-silent:5")
+    await until(lambda: any("the stop could not be sent" in a.what for a in bare.alarms))
+    with pytest.raises(DeviceError, match="the stop was not confirmed") as told:
+        await motors.stop()
+    assert "emergency stop" in told.value.remedy
+    await motors.stop()  # asked for again it is known
+    del motors._bus._halting
+    gc.collect()
+    assert unseen == []
 
 
 async def test_nothing_that_was_under_way_undoes_a_stop(bare):

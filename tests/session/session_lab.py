@@ -13,6 +13,7 @@ from app.clock import Clock
 from app.files.pose_table import Pose
 from app.files.site import Hands, Site, parse_site
 from app.files.site_limits import Limits
+from app.session.answered import expected_targets
 from app.session.plan import Plan
 from app.session.plans import PlanOptions, measure_plan
 from app.session.session import Session
@@ -82,7 +83,7 @@ class Silent:
 
 
 class LabController(Silent):
-    """Is where it was sent at once; q are numbers that tell the pose."""
+    """Is where it was sent at once; q are those of the drawing."""
 
     can = ControllerCan()
     identity = Identity("canopen", serial="17")
@@ -106,7 +107,8 @@ class LabController(Silent):
 
     async def move_to_pose(self, pose: tuple[float, ...]) -> tuple[float, ...]:
         self.room.log.append("move")
-        self.room.pose = self.q = tuple(pose)
+        self.room.pose = tuple(pose)
+        self.q = tuple(expected_targets(self.room.site.machine, self.held, pose))
         return self.q
 
     async def wait_arrived(self, timeout: float) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from session_lab import Lab, lab_in
-from session_mock import POSES, Heard
+from session_mock import Heard
 
 from app.files.machines import load_machine
 from app.session import events as ev
@@ -220,7 +220,7 @@ async def test_a_machine_that_stands_where_it_was_last_sent_need_not_be_sent_aga
     await ensure_at(work, "a")
     await take_stock(work)
     assert work.memory.standing_at == "a"
-    assert work.memory.q == POSES["a"]
+    assert work.memory.q == lab.controller.q
     assert len(work.journal.rows()) == 1
 
 

@@ -65,7 +65,9 @@ async def _aimed_by_hand(work: Work, nest: str) -> None:
     if (await work.tracker.state()).locked:
         return
     text = f"Bring the tracker's beam onto the SMR in nest {nest}."
-    lost = NoTarget(f"the beam is not on the SMR in nest {nest}", device="tracker")
+    lost = NoTarget(
+        f"the beam is not on the SMR in nest {nest}", device="tracker", remedy="Bring it there"
+    )
     if await work.ask(text, ("done", "stop"), None, lost) == "stop":
         raise StoppedByOperator(f"stopped when the beam was to be brought to nest {nest}")
 

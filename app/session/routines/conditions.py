@@ -1,6 +1,7 @@
 """The state of things, as controller, tracker and site file tell it."""
 
 from app.session.work import Work
+from drivers import plausible
 
 _CHANNELS_AGE_S = 8.0
 
@@ -16,6 +17,8 @@ async def channels(work: Work) -> dict[str, float]:
         tracker_says = {} if work.site.gauge else await work.tracker.channels()
         payload = work.site.payload_kg
         typed = {} if payload is None else {"payload_kg": payload}
-        known = {**typed, **tracker_says, **await work.controller.channels()}
+        controller_says = await work.controller.channels()
+        plausible.channels(controller_says, "controller")
+        known = {**typed, **tracker_says, **controller_says}
         work.memory.channels = (work.clock.now(), known)
     return dict(known)

@@ -111,7 +111,9 @@ async def _span(work: Work, label: str, pair: tuple[str, str], *, stays: bool) -
 
 def _own(work: Work) -> GaugeSite:
     if work.site.gauge is None:
-        raise NotReady("this site has no gauge", remedy="Go on with the site of the session")
+        raise NotReady(
+            "this site has no gauge", device="gauge", remedy="Go on with the site of the session"
+        )
     return work.site.gauge
 
 

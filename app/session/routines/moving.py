@@ -7,6 +7,7 @@ import numpy as np
 
 from app.files.pose_table import HOME, Pose
 from app.hosted.controller import HostedController
+from app.session.answered import must_be_within_reach, must_belong
 from app.session.events import LivePose, PoseCommanded
 from app.session.journal import NewRow
 from app.session.plan import Step
@@ -53,7 +54,10 @@ async def go(work: Work, label: str) -> None:
         work.controller.told({"delay_s": memory.delay_s, **await channels(work)})
         work.controller.ask_with(partial(_ask_for_pose, work, label))
     q = await work.controller.move_to_pose(commanded_coordinates(work.site.machine, pose))
+    hosted = isinstance(work.controller, HostedController)
     by_hand = isinstance(work.controller, HostedController) and work.controller.by_hand
+    if not hosted:
+        must_belong(work.site.machine, work.controller_parameters, pose, q)
     if not by_hand:
         _write_move(work, label, q)
     work.tell(PoseCommanded(label, pose, q, work.clock.now()))
@@ -126,6 +130,7 @@ async def take_stock(work: Work) -> None:
     """
     state = await work.controller.state()
     q = tuple(actuator.target for actuator in state.actuators)
+    must_be_within_reach(work.site.machine, q)
     last = work.journal.last_row()
     same = last is not None and all(abs(a - b) < _SAME for a, b in zip(q, last.q, strict=True))
     work.memory.q = q
