@@ -5,7 +5,9 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
-from app.files.foreign_table import DELIMITERS, ForeignTable, Layout, parse_number, table_of
+from app.files.foreign_layout import DELIMITERS, Layout
+from app.files.foreign_numbers import parse_number
+from app.files.foreign_table import ForeignTable, table_of
 from calib.errors import BadInput
 from calib.plain_text import plain
 from calib.units import UNITS, known_as

@@ -1,10 +1,10 @@
 """How a map names columns: labels with patterns, numbers with units, signs, gears and offsets."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from app.files.foreign_table import Column, pattern_of
+from app.files.foreign_table import Column
+from app.files.patterns import find, pattern_of
 from calib.quantity import measured, quantity
 from calib.toml_table import TomlTable
 from calib.units import Unit, unit_named
@@ -24,11 +24,11 @@ class Text:
     same_joints: bool = False
     each_row: bool = False
 
-    def label(self, cells: Sequence[str]) -> str:
-        """The label in the cells of one row; "" where the pattern finds nothing."""
+    def label(self, cells: Sequence[str], place: str) -> str:
+        """The label in the cells of one row at ``place``; "" where the pattern finds nothing."""
         whole = "/".join(cells)
         if self.pattern:
-            found = re.search(self.pattern, whole)
+            found = find(self.pattern, whole, place)
             if found is None:
                 return ""
             whole = next((part for part in found.groups() if part is not None), found.group(0))

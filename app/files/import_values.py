@@ -9,7 +9,8 @@ import numpy as np
 
 from app.files.foreign_table import ForeignTable
 from app.files.import_columns import Numbers, Text
-from app.files.import_map import Reading, Sigma, Time
+from app.files.import_map import Reading, Time
+from app.files.import_sigma import Sigma
 from app.files.time_forms import are_days, form_of
 from calib.arrays import Array
 from calib.errors import BadInput
@@ -99,7 +100,10 @@ class Reader:
         """The label of every row; "" where there is none."""
         columns = [self.at(column, wanted.place) for column in wanted.columns]
         return [
-            wanted.label([self.table.text(row, at) for at in columns])
+            wanted.label(
+                [self.table.text(row, at) for at in columns],
+                self.table.place(row, columns[0]) if columns else wanted.place,
+            )
             for row in range(len(self.table.rows))
         ]
 

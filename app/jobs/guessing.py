@@ -8,7 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from app.files.foreign_table import ForeignTable, parse_number
+from app.files.foreign_numbers import parse_number
+from app.files.foreign_table import ForeignTable
 from app.files.guessed_layout import guessed_table
 from app.files.import_map import FORMAT
 from app.files.machines import load_machine

@@ -6,8 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.files.foreign_table import Layout, parse_number, read_foreign, table_of
+from app.files import patterns
+from app.files.foreign_layout import Layout
+from app.files.foreign_numbers import parse_number
+from app.files.foreign_table import read_foreign, table_of
 from calib.errors import BadInput
+from calib.toml_table import TomlTable
 from calib.units import UNITS, split_header, unit_named
 
 SEMI = Layout(delimiter=";", decimal=",")
@@ -127,3 +131,32 @@ def test_units_are_what_they_are() -> None:
         unit_named("deg", "a.toml", "mm")
     with pytest.raises(BadInput, match='unknown unit "furlong"'):
         unit_named("furlong", "a.toml")
+
+
+def stated(pattern: str) -> str:
+    return patterns.pattern_of(TomlTable.parse(f"pattern = '{pattern}'", "map.toml"), "pattern")
+
+
+@pytest.mark.parametrize("pattern", [r"^(\d+)_", r"^(.+)_[^_]+$", r"(\w+)\s+(\w+)\s+(\w+)"])
+def test_a_pattern_of_labels_is_taken_as_it_is(pattern: str) -> None:
+    assert stated(pattern) == pattern
+    assert patterns.find(pattern, "12_p1 collection group", "f.csv, line 3")
+
+
+@pytest.mark.parametrize("pattern", [r"^(a+)+$", r"(\w+\s?)+:"])
+def test_a_pattern_that_can_take_for_ever_is_refused_when_it_is_read(pattern: str) -> None:
+    with pytest.raises(BadInput, match="takes too long on a line such as") as caught:
+        stated(pattern)
+    assert "map.toml, line 1" in str(caught.value)
+    assert "no repeat within a repeat" in str(caught.value)
+
+
+def test_a_pattern_that_takes_for_ever_on_some_label_is_ended_there() -> None:
+    """A hidden one: nothing that it is tried on when it is read is slow."""
+    pattern = stated("(?:xyz|xy|z|x|y)*!")
+    with pytest.raises(BadInput, match=r"f\.csv, line 3: the pattern .* takes too long") as caught:
+        patterns.find(pattern, "xyz" * 100, "f.csv, line 3")
+    assert "repeat" in str(caught.value)
+    with pytest.raises(BadInput, match="5000 signs"):
+        patterns.find(pattern, "x" * 5000, "f.csv, line 3")
+    assert patterns.find(pattern, "xyz!", "f.csv, line 3")
