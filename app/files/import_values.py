@@ -12,7 +12,7 @@ from app.files.import_columns import Numbers, Text
 from app.files.import_map import Reading, Time
 from app.files.import_sigma import Sigma
 from app.files.time_forms import are_days, form_of
-from calib.arrays import Array
+from calib.arrays import Array, BoolArray
 from calib.errors import BadInput
 from calib.units import Unit, unit_named
 
@@ -259,17 +259,23 @@ def one_number(reader: Reader, reading: Reading, sigma: Sigma) -> dict[str, Arra
     value = reader.numbers(reading.numbers)[0]
     spread = np.full(value.size, sigma.value or np.nan)
     if sigma.numbers is not None:
-        spread = np.abs(reader.numbers(sigma.numbers)[0])
-        reader_row = np.flatnonzero(np.isfinite(value) & ~(spread > 0.0))
-        if reader_row.size:
-            row = int(reader_row[0])
-            raise BadInput(
-                f"the uncertainty of this number is {spread[row]:g}",
-                place=f"{reader.table.source}, line {reader.table.lines[row]}",
-                remedy="Write a number larger than zero",
-            )
+        spread = reader.numbers(sigma.numbers)[0]
+        _uncertain(reader, sigma.numbers, spread[None], np.isfinite(value))
     names = ("z", "sz") if reading.kind == "height" else ("value", "sigma")
     return dict(zip(names, (value, spread / sigma.coverage), strict=True))
+
+
+def _uncertain(reader: Reader, numbers: Numbers, each: Array, there: BoolArray) -> None:
+    """Refuse uncertainties (k, N) that are none where a reading is ``there`` (N,)."""
+    wrong = np.argwhere((there & ~(each > 0.0)).T)
+    if wrong.size:
+        row, column = (int(one) for one in wrong[0])
+        found = each[column, row]
+        raise BadInput(
+            "the uncertainty is missing" if np.isnan(found) else f"an uncertainty of {found:g}",
+            place=reader.table.place(row, reader.at(numbers.columns[column], numbers.place)),
+            remedy='Write one larger than zero, or [sigma] value = "..." for all readings',
+        )
 
 
 def _outer(v: Array) -> Array:
@@ -278,15 +284,9 @@ def _outer(v: Array) -> Array:
 
 def _covariance(reader: Reader, sigma: Sigma, position: Array) -> Array:
     if sigma.numbers is not None:
-        each = np.abs(reader.numbers(sigma.numbers)) / sigma.coverage
-        for row in range(position.shape[1]):
-            here = np.isfinite(position[:, row]).all()
-            if here and not (np.isfinite(each[:, row]).all() and each[:, row].min() > 0.0):
-                at = reader.at(sigma.numbers.columns[0], sigma.numbers.place)
-                raise BadInput(
-                    "the uncertainty is missing or zero", place=reader.table.place(row, at),
-                    remedy='Write one larger than zero, or [sigma] value = "..." for all readings',
-                )  # fmt: skip
+        each = reader.numbers(sigma.numbers)
+        _uncertain(reader, sigma.numbers, each, np.asarray(np.isfinite(position).all(axis=0)))
+        each = each / sigma.coverage
     else:
         assert sigma.value is not None
         distance = np.linalg.norm(position, axis=0)

@@ -1,7 +1,7 @@
 """Foreign tables as the rows of runs, by a map; everything that was assumed is listed."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from itertools import pairwise
@@ -181,6 +181,12 @@ class _Rows:
         place = self.reader.numbers(pose.place_numbers)
         there = np.concatenate([place, self.reader.numbers(pose.turn_numbers)])
         good = np.asarray(np.isfinite(there).all(axis=0), dtype=bool)
+        if (part := np.flatnonzero(np.isfinite(there).any(axis=0) & ~good)).size:
+            raise BadInput(
+                "a part of the pose is missing",
+                place=f"{self.table.source}, line {self.table.lines[int(part[0])]}",
+                remedy="Expected place and attitude whole, or none of them",
+            )
         turns = to_euler(rotations_of(self.reader, pose.turn_numbers, pose.rotation, good))
         values = np.where(good, np.concatenate([place, turns]), np.nan)
         spread = [sigma.value / sigma.coverage, sigma.angle / sigma.coverage]
@@ -207,13 +213,21 @@ class _Rows:
         else:
             columns = one_number(self.reader, reading, self.plan.sigma)
         kind = "point" if reading.kind == "height" else reading.kind
-        cells = [{name: float(v[row]) for name, v in columns.items()} for row in range(count)]
+        cells = [self._held(row, columns, reading.kind) for row in range(count)]
         return [
             replace(_NOTHING, cells=one, kind=kind, nest2=reading.nest2, plane=reading.plane)
-            if all(map(math.isfinite, one.values()))
+            if one
             else None
             for one in cells
         ]
+
+    def _held(self, row: int, columns: Mapping[str, Array], kind: str) -> dict[str, float]:
+        """What a row holds of a reading that is no point, by name; empty where it is nothing."""
+        found = {name: float(v[row]) for name, v in columns.items()}
+        none = [name for name, value in found.items() if not math.isfinite(value)]
+        if kind == "angles" and not {"azimuth", "elevation"} <= set(none):
+            return {n: v for n, v in found.items() if n not in none and n[1:] not in none}
+        return {} if none else found
 
     def _chosen(self) -> list[int]:
         count = len(self.table.rows)
@@ -268,9 +282,13 @@ class _Rows:
             return nest
         what = f'unknown nest "{nest}"' if nest else "no nest is found in the label of this reading"
         known = ", ".join(sorted(self.nests))
+        place = f"{self.table.source}, line {self.table.lines[row]}"
+        if self.plan.nest is not None and self.plan.nest.columns:
+            at = self.reader.at(self.plan.nest.columns[0], self.plan.nest.place)
+            place = self.table.place(row, at)
         raise BadInput(
             what,
-            place=f"{self.table.source}, line {self.table.lines[row]}",
+            place=place,
             remedy=f"Known are {known}. Add its place under [nests.platform] or [nests.base], its "
             "other name under [nest.names], or choose rows with [only]",
         )

@@ -97,6 +97,28 @@ def test_what_a_number_cannot_be_is_refused(
     assert said in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("sigma", ["0", "-0,01", "", "nan", "wide"])
+@pytest.mark.parametrize("kind", ["height", "distance", "xyz"])
+def test_an_uncertainty_that_is_none_is_named_with_line_and_column(
+    kind: str, sigma: str, tmp_path: Path, capsys
+) -> None:
+    file, plan = table(tmp_path / "a.csv", ["1"] * 3), tmp_path / "map.toml"
+    lines = file.read_bytes().decode("latin-1").splitlines()
+    lines = [lines[0] + ";sig [mm]", *(f"{line};0,01" for line in lines[1:])]
+    lines[2] = lines[2].removesuffix("0,01") + sigma
+    file.write_bytes("\n".join([*lines, ""]).encode("latin-1"))
+    text = HEAD.format(time="step_s = 5.0", reading=f'kind = "{kind}"', sigma="")
+    text = text.replace('value = ""', 'columns = ["sig"]')
+    if kind == "distance":
+        text = text.replace('kind = "distance"', 'kind = "distance"\nnest2 = "anchor"')
+    if kind == "xyz":
+        text = text.replace('["Höhe"]', '["Höhe", "Höhe", "Höhe"]')
+        text = text.replace('["sig"]', '["sig", "sig", "sig"]')
+    plan.write_text(text, "utf-8")
+    assert pkmcal(["import", str(file), "--map", str(plan), "--out", str(tmp_path / "run")]) == 2
+    assert "a.csv, line 3, column sig: " in capsys.readouterr().err
+
+
 def test_excels_dates_are_read_or_refused_by_name(tmp_path: Path, capsys) -> None:
     days = [f"{46095.39 + 10.0 * k / 86400.0:.8f}".replace(".", ",") for k in range(4)]
     file, plan = table(tmp_path / "a.csv", days), tmp_path / "map.toml"

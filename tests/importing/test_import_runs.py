@@ -193,6 +193,21 @@ def test_measured_poses_and_directions_make_a_run_of_version_2(bench, tmp_path, 
     clockwise = np.arctan2(y, x) - 0.5 * np.pi
     assert np.allclose(np.angle(np.exp(1j * (found.position[0] - clockwise))), 0.0, atol=1e-9)
     assert np.allclose(found.position[1], np.arctan2(z, np.hypot(x, y)), atol=1e-9)
+    # Half a direction is a reading, half a pose is none, and neither is left out in silence.
+    table = tmp_path / "a.csv"
+    names, first, *rest = table.read_text().splitlines()
+    half = ",".join([*first.split(",")[:-1], ""])
+    table.write_text("\n".join([names, half, *rest, ""]))
+    brought(bench, table, tmp_path / "angles.toml", tmp_path / "half")
+    again = read_run(tmp_path / "half").run
+    assert again.readings == len(posed)
+    assert again.sensing.seen[:, again.measured][:2, 0].tolist() == [True, False]
+    at = names.split(",").index("t1")
+    part = [cell if k != at else "" for k, cell in enumerate(first.split(","))]
+    table.write_text("\n".join([names, ",".join(part), *rest, ""]))
+    with pytest.raises(BadInput, match="a part of the pose is missing") as caught:
+        unlooked(bench, table, tmp_path / "pose.toml")
+    assert "line 2" in str(caught.value)
 
 
 def test_gears_signs_zeros_and_counts(bench, tmp_path) -> None:
