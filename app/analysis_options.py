@@ -1,6 +1,7 @@
 """Options that analysing verbs share: which machine, which effects in the model, who watches."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -98,6 +99,45 @@ def machine_options(function: _Function) -> _Function:
         "--closure", default="", help="Another closure of an over-constrained machine's file."
     )(function)
     return click.argument("machine_name", metavar="MACHINE")(function)
+
+
+def spread_options(function: _Function) -> _Function:
+    """Give a verb ``--workers N`` and ``--scheduler ADDRESS``: who does it (:mod:`app.spread`)."""
+    function = click.option(
+        "--scheduler",
+        default="",
+        metavar="ADDRESS",
+        help="Let the workers of a Dask scheduler do it, tcp://HOST:PORT.",
+    )(function)
+    return click.option(
+        "--workers", type=click.IntRange(1), help="Processes.  [default: one for each processor]"
+    )(function)
+
+
+def monte_carlo_option(function: _Function) -> _Function:
+    """Give a verb ``--monte-carlo MACHINES``."""
+    return click.option(
+        "--monte-carlo",
+        type=click.IntRange(0),
+        default=0,
+        metavar="MACHINES",
+        help="Draw so many machines within their tolerances, too, and close each exactly.",
+    )(function)
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[int, int], None] | None]:
+    """A bar on standard error while a person looks on: told how many of how many are done."""
+    if not answer.interactive():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
+
+    columns = (MofNCompleteColumn(), BarColumn(24), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=None)
+        yield lambda done, of: bar.update(task, completed=done, total=of)
 
 
 def bars(values: list[float], width: int = 24) -> list[str]:

@@ -11,7 +11,6 @@ import argparse
 import os
 import time
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -21,6 +20,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from app.files.machines import load_machine
+from app.spread import spread
 from bench._blind_cases import SIGMA_MM, Case, build, draw_cases, draw_nulls
 from bench._blind_follow_up import follow_up, named
 from bench._blind_judge import Foreseen, foreseen, pulls
@@ -35,6 +35,9 @@ from calib.poses.readings import NestReadings
 from calib.runs import parse_header, parse_run
 from calib.runs.stack import stack
 from mocks.simulate.files import points_csv, run_toml
+
+SHARE = 4
+"""Cases of one question."""
 
 
 @dataclass(frozen=True)
@@ -157,12 +160,18 @@ def attempt(case: Case) -> Outcome:
         return Outcome(case, False, None, (), (), False, float("nan"), False, failure=str(error))
 
 
-def run_all(cases: Sequence[Case], workers: int) -> list[Outcome]:
-    """Solve all cases on several processes."""
+def attempts(cases: Sequence[Case]) -> list[Outcome]:
+    """Solve some cases."""
+    return [attempt(case) for case in cases]
+
+
+def run_all(cases: Sequence[Case], workers: int, scheduler: str = "") -> list[Outcome]:
+    """Solve all cases on several processes, or by the workers of a Dask scheduler."""
     from bench import blind as here  # importable by name in the other processes
 
-    with ProcessPoolExecutor(workers) as pool:
-        return list(pool.map(here.attempt, cases, chunksize=4))
+    shares = [cases[first : first + SHARE] for first in range(0, len(cases), SHARE)]
+    found = dict(spread(here.attempts, shares, workers=workers, scheduler=scheduler))
+    return [one for number in range(len(shares)) for one in found[number]]
 
 
 def main() -> None:
@@ -171,6 +180,7 @@ def main() -> None:
     parser.add_argument("--null", type=int, default=400)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--scheduler", default="", help="address of a Dask scheduler instead")
     parser.add_argument("--machines", default="hexapod,tripod,ptm")
     parser.add_argument("--only", choices=("single", "several", "unknown"))
     parser.add_argument("--hide", help="effects that may be hidden, by comma; all by default")
@@ -191,7 +201,7 @@ def main() -> None:
         ]
         nulls = draw_nulls(options.null, options.seed, machine)
         asked = [replace(case, noise=options.noise) for case in (*cases, *nulls)]
-        outcomes = run_all(asked, options.workers)
+        outcomes = run_all(asked, options.workers, options.scheduler)
         text += "\n" + page(outcomes, machine, time.perf_counter() - begin)
     print(text)
     if options.page is not None:

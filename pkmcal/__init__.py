@@ -71,10 +71,8 @@ if TYPE_CHECKING:
     from app.jobs.looking_back import HistoryReport as HistoryReport
     from app.jobs.looking_back import history_of as history_of
     from app.jobs.measuring import SessionReport as SessionReport
-    from app.jobs.posing import GridReport as GridReport
     from app.jobs.posing import PosesReport as PosesReport
     from app.jobs.posing import choose_poses as choose_poses
-    from app.jobs.posing import verification_grid as verification_grid
     from app.jobs.predicting import PredictReport as PredictReport
     from app.jobs.predicting import predict as predict
     from app.jobs.repeating import Iso9283Report as Iso9283Report
@@ -85,6 +83,8 @@ if TYPE_CHECKING:
     from app.jobs.simulating import simulate as simulate
     from app.jobs.telling_apart import IdentifiabilityReport as IdentifiabilityReport
     from app.jobs.telling_apart import identifiability as identifiability
+    from app.jobs.verification_grid import GridReport as GridReport
+    from app.jobs.verification_grid import verification_grid as verification_grid
     from app.jobs.verifying import VerificationReport as VerificationReport
     from calib.errors import BadInput as BadInput
     from drivers.errors import DeviceError as DeviceError
@@ -108,7 +108,7 @@ _HOMES = {
     "FleetReport": "app.jobs.fleet",
     "FollowUpReport": "app.jobs.following_up",
     "GateRefused": "app.errors",
-    "GridReport": "app.jobs.posing",
+    "GridReport": "app.jobs.verification_grid",
     "GuessReport": "app.jobs.guessing",
     "HistoryReport": "app.jobs.looking_back",
     "IdentifiabilityReport": "app.jobs.telling_apart",
@@ -155,7 +155,7 @@ _HOMES = {
     "session_log": "app.jobs.listing",
     "simulate": "app.jobs.simulating",
     "site_kinds": "app.jobs.device_kinds",
-    "verification_grid": "app.jobs.posing",
+    "verification_grid": "app.jobs.verification_grid",
 }
 """Where each public name is defined."""
 

@@ -1,30 +1,30 @@
-"""Choose where to measure and where to verify, and predict what accuracy that gives."""
+"""Choose where to measure, and predict what accuracy that gives."""
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
-from app.files.machines import load_machine
 from app.files.pose_table import Pose, poses_text
-from app.files.poses import full_poses, render_design, render_pose_file
-from app.files.site import Site, load_site
+from app.files.poses import full_poses, render_design
+from app.files.site import Site
 from app.files.site_limits import Limits
 from app.jobs.chosen_runs import File, at_least
-from app.jobs.read_there import CALIPERS_SIGMA_UM, drawn_for, readings_of
+from app.jobs.read_there import CALIPERS_SIGMA_UM, readings_of
 from app.jobs.record import Record, Report
+from app.jobs.searching import Search, best_of, fresh_poses, search
+from app.jobs.verification_grid import machine_for, site_of
 from calib.defaults import POSES_FROM
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.limits import Margin
-from calib.poses.design import TABLE, Design, design_poses
+from calib.poses.design import Design
 from calib.poses.gauges import MarkPairs, choose_marks
 from calib.poses.information import Accuracy
 from calib.poses.margin import stroke_margin
-from calib.poses.verification import VerificationGrid, verification_poses
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,34 +110,6 @@ class PosesReport(Report):
         path.write_text(text, encoding="utf-8")
 
 
-@dataclass(frozen=True, kw_only=True)
-class GridReport(Report):
-    """The verification grid of a machine (``pkm-verification/1``).
-
-    ``box`` is what of the workspace it spans (mm, deg); ``poses``: label -> x, y, z (mm),
-    rx, ry, rz (rad), platform in the base frame.
-    """
-
-    FORMAT: ClassVar[str] = "pkm-verification/1"
-    machine: str
-    workspace_scale: float
-    box: Mapping[str, tuple[float, ...]]
-    poses: Mapping[str, tuple[float, ...]]
-    _grid: VerificationGrid = field(repr=False, compare=False)
-
-    def by_label(self) -> dict[str, Pose]:
-        """Label -> x, y, z (mm), rx, ry, rz (rad): the platform in the base frame, in order."""
-        return self._grid.by_label
-
-    def save(self, file: File) -> None:
-        """Write a poses file."""
-        command = f"pkmcal poses {self.machine} --verification"
-        title = f"{len(self._grid.labels)} verification poses for {self.machine}"
-        about = {"workspace_scale": self._grid.scale}
-        text = render_pose_file(self._grid.labels, self._grid.pose_set, title, about, command)
-        Path(file).write_text(text, encoding="utf-8")
-
-
 def choose_poses(
     machine: str | os.PathLike[str] | None = None,
     n: int = 29,
@@ -153,6 +125,10 @@ def choose_poses(
     candidates: int = POSES_FROM,
     seed: int = 1,
     margin_mm: float | None = None,
+    searches: int = 1,
+    workers: int | None = None,
+    scheduler: str = "",
+    watch: Callable[[int, int], None] | None = None,
 ) -> PosesReport:
     """Choose measurement poses among reachable ones, and predict what accuracy they give.
 
@@ -185,6 +161,15 @@ def choose_poses(
         Draws the candidates.
     margin_mm : float, optional
         Kept free at the ends of strokes beyond what the tolerances need; the site's if missing.
+    searches : int
+        So many searches, from ``seed`` on each with the next; the one with the smallest predicted
+        error is kept, and its ``seed`` told.
+    workers : int, optional
+        Processes that do them; one for each processor if not given.
+    scheduler : str
+        Address of a Dask scheduler in place of processes.
+    watch : callable, optional
+        Told how many of how many searches are done.
 
     Returns
     -------
@@ -193,7 +178,8 @@ def choose_poses(
     Raises
     ------
     BadInput
-        For a machine or site that cannot be read, and uncertainties that are not positive.
+        For a machine or site that cannot be read, uncertainties that are not positive, and a
+        scheduler that does not answer.
 
     Examples
     --------
@@ -202,24 +188,19 @@ def choose_poses(
     6.7
     >>> chosen.save("poses.toml")                                            # doctest: +SKIP
     """
-    at_least(1, n=n, candidates=candidates)
+    at_least(1, n=n, candidates=candidates, searches=searches)
     named = "" if machine is None else os.fspath(machine)
-    here = _site(site)
-    described = _machine(named, here)
+    here = site_of(site)
+    described = machine_for(named, here)
     margin = _margin(described, here, margin_mm)
     readings = readings_of(described, here, heights, sigma_um, angle_mdeg)
-    found = design_poses(
-        described,
-        readings,
-        n,
-        np.random.default_rng(seed),
-        criterion=criterion,
-        priors=priors,
-        candidates=candidates,
-        counts=[count for count in TABLE if count <= candidates],
-        margin=margin,
-        draw=drawn_for(here, margin),
-    )
+    asked = Search(described, here, readings, n, seed, criterion, priors, candidates, margin)
+    if searches > 1:
+        asked = replace(asked, fresh=fresh_poses(described, seed))
+        several = [replace(asked, seed=seed + number) for number in range(searches)]
+        found, seed = best_of(several, workers, scheduler, watch)
+    else:
+        found = search(asked)
     marks = None
     if calipers:
         nest = next(iter(here.platform_nests.values())) if here else (0.0, 0.0, 0.0)
@@ -238,62 +219,6 @@ def choose_poses(
     command += f" --margin-mm {margin_mm:g}" if margin_mm is not None else ""
     said = _said(found, seed, margin, marks)
     return PosesReport.of(said, _design=found, _command=command)
-
-
-def verification_grid(
-    machine: str | os.PathLike[str] | None = None, *, site: File | None = None
-) -> GridReport:
-    """The poses at which a machine is verified: 27 nodes with 8 orientations, all within reach.
-
-    Parameters
-    ----------
-    machine : str or path, optional
-        A shipped machine's name, or a machine file; that of the site if missing.
-    site : path, optional
-        A site file.
-
-    Returns
-    -------
-    GridReport
-
-    Raises
-    ------
-    BadInput
-        For a machine or site that cannot be read.
-
-    Examples
-    --------
-    >>> len(pkmcal.verification_grid("hexapod").poses)                       # doctest: +SKIP
-    216
-    """
-    described = _machine("" if machine is None else os.fspath(machine), _site(site))
-    grid = verification_poses(described)
-    box = {
-        name: [low, high] if name in "xyz" else [float(np.rad2deg(low)), float(np.rad2deg(high))]
-        for name, (low, high) in grid.box.items()
-    }
-    said = {
-        "format": "pkm-verification/1",
-        "machine": described.name,
-        "workspace_scale": grid.scale,
-        "box": box,
-        "poses": grid.by_label,
-    }
-    return GridReport.of(said, _grid=grid)
-
-
-def _site(site: File | Site | None) -> Site | None:
-    if site is None or isinstance(site, Site):
-        return site
-    return load_site(Path(site))
-
-
-def _machine(name: str, site: Site | None) -> Machine:
-    if name:
-        return load_machine(name)
-    if site:
-        return site.machine
-    raise BadInput("no machine is named", remedy="Write pkmcal poses hexapod, or give --site.")
 
 
 def _margin(machine: Machine, site: Site | None, margin_mm: float | None) -> Margin:

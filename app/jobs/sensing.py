@@ -9,6 +9,7 @@ import numpy as np
 
 from app.files.machines import closed_machine
 from app.jobs.chosen_runs import File
+from app.jobs.drawing import DrawnEntry, Watch, drawn_errors
 from app.jobs.record import Record, Report
 from calib.analysis.coverage import workspace_poses
 from calib.analysis.sensitivity import Index, Sensitivity, Tolerance, tolerances
@@ -58,7 +59,10 @@ class ToleranceEntry(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class SensitivityReport(Report):
-    """How much each geometric error moves the platform (``pkm-sensitivity/1``)."""
+    """How much each geometric error moves the platform (``pkm-sensitivity/1``).
+
+    ``drawn``: machines of a Monte Carlo, closed exactly; None where none was asked for.
+    """
 
     FORMAT: ClassVar[str] = "pkm-sensitivity/1"
     machine: str
@@ -68,6 +72,7 @@ class SensitivityReport(Report):
     kinds: tuple[SensitivityEntry, ...]
     within_tolerances: PoseSpread
     tolerances: tuple[ToleranceEntry, ...]
+    drawn: DrawnEntry | None = None
     _found: Sensitivity = field(repr=False, compare=False)
 
     def draw(self, file: File, *, each: bool = False) -> None:
@@ -86,6 +91,10 @@ def sensitivity(
     orientation_mdeg: float | None = None,
     poses: int = 500,
     seed: int = 1,
+    monte_carlo: int = 0,
+    workers: int | None = None,
+    scheduler: str = "",
+    watch: Watch | None = None,
 ) -> SensitivityReport:
     """Tell what every geometric error does to the pose, mean and spread over the workspace.
 
@@ -102,7 +111,16 @@ def sensitivity(
     poses : int
         Poses over the workspace.
     seed : int
-        Draws them.
+        Draws them, and the machines.
+    monte_carlo : int
+        So many machines are drawn within their tolerances, each closed exactly at these poses:
+        what they are off by stands in ``drawn``.
+    workers : int, optional
+        Processes that do it; one for each processor if not given.
+    scheduler : str
+        Address of a Dask scheduler in place of processes.
+    watch : callable, optional
+        Told how many of how many shares of the machines are done.
 
     Returns
     -------
@@ -112,7 +130,8 @@ def sensitivity(
     Raises
     ------
     BadInput
-        For a machine file that cannot be read, and an accuracy that is not positive.
+        For a machine file that cannot be read, an accuracy that is not positive, machines of which
+        none can take all of the poses, and a scheduler that does not answer.
 
     Examples
     --------
@@ -122,7 +141,8 @@ def sensitivity(
         if value is not None and value <= 0.0:
             raise BadInput(f"{name} is {value:g}", remedy="Give a positive accuracy.")
     chosen = closed_machine(machine, closure)
-    found = global_sensitivity(workspace_poses(chosen, poses, np.random.default_rng(seed)))
+    where = workspace_poses(chosen, poses, np.random.default_rng(seed))
+    found = global_sensitivity(where)
     wanted: tuple[Tolerance, ...] = ()
     if position_um is not None or orientation_mdeg is not None:
         wanted = tolerances(
@@ -142,6 +162,9 @@ def sensitivity(
             "orientation_rms_deg": found.orientation_sigma / DEGREE,
         },
         "tolerances": [_tolerance(one) for one in wanted],
+        "drawn": drawn_errors(where, monte_carlo, seed, workers, scheduler, watch)
+        if monte_carlo
+        else None,
     }
     return SensitivityReport.of(said, _found=found)
 

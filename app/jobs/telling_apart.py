@@ -11,7 +11,9 @@ from app.files.machines import closed_machine
 from app.files.poses import nest_matrix, read_pose_file
 from app.files.site import load_site
 from app.jobs.chosen_runs import File
+from app.jobs.drawing import CalibratedEntry, Watch, drawn_calibrations
 from app.jobs.record import Record, Report
+from app.show.drawn_words import calibrated_words
 from app.show.identifiability_words import report
 from calib.analysis.benefit import options
 from calib.analysis.coverage import workspace_poses
@@ -92,6 +94,7 @@ class IdentifiabilityReport(Report):
     ``identified`` are parameters whose uncertainty is less than half of their tolerance;
     ``unidentified`` groups are seen only together; ``sigma_ratio`` is the uncertainty over the
     prior's; ``exact_groups`` and ``relations`` cannot be told apart however often they are read.
+    ``drawn``: machines of a Monte Carlo, each calibrated; None where none was asked for.
     """
 
     FORMAT: ClassVar[str] = "pkm-identifiability/1"
@@ -113,6 +116,7 @@ class IdentifiabilityReport(Report):
     gauge: GaugeEntry
     subsets: tuple[SubsetEntry, ...]
     options: tuple[OptionEntry, ...]
+    drawn: CalibratedEntry | None = None
     _text: str = field(repr=False, compare=False)
 
     @property
@@ -135,6 +139,10 @@ def identifiability(
     poses: int | File | None = None,
     only: Sequence[str] = (),
     seed: int = 1,
+    monte_carlo: int = 0,
+    workers: int | None = None,
+    scheduler: str = "",
+    watch: Watch | None = None,
 ) -> IdentifiabilityReport:
     """Tell which parameters readings can tell apart, and what another reading would buy.
 
@@ -163,7 +171,17 @@ def identifiability(
     only : sequence of str
         A choice of parameters to judge, with ``?`` and ``*``: ``["limb?.0dx1", "limb5.*"]``.
     seed : int
-        Draws the poses.
+        Draws the poses, and the machines.
+    monte_carlo : int
+        So many machines are drawn within their tolerances, read at these poses with noise and
+        calibrated: what is left at fresh poses stands in ``drawn``, with how often the predicted
+        uncertainties hold.
+    workers : int, optional
+        Processes that do it; one for each processor if not given.
+    scheduler : str
+        Address of a Dask scheduler in place of processes.
+    watch : callable, optional
+        Told how many of how many shares of the machines are done.
 
     Returns
     -------
@@ -172,8 +190,9 @@ def identifiability(
     Raises
     ------
     BadInput
-        For files that cannot be read, an uncertainty that is not positive, and names in ``only``
-        that no parameter has.
+        For files that cannot be read, an uncertainty that is not positive, names in ``only`` that
+        no parameter has, machines of which none can take all of the poses, and a scheduler that
+        does not answer.
 
     Examples
     --------
@@ -197,10 +216,17 @@ def identifiability(
         compare_subsets(observation, judged, found.base, named),
         options(chosen, where, fresh, sights, generator),
     )
+    drawn = None
+    if monte_carlo:
+        drawn = drawn_calibrations(
+            where, fresh, sights, monte_carlo, seed, workers, scheduler, watch
+        )
+        text += f"\n\n{calibrated_words(drawn)}"
     head = {
         "format": IdentifiabilityReport.FORMAT,
         "machine": chosen.name,
         "closure": closure or "own",
+        "drawn": drawn,
     }
     return IdentifiabilityReport.of({**head, **said}, _text=text)
 

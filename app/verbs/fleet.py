@@ -3,14 +3,13 @@
 Each is fitted alone, then with what all have in common; see docs/fleet.md.
 """
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import click
 
 from app import answer
+from app.analysis_options import progress, spread_options
 from app.show.text_table import text_table
 
 FEW = 12
@@ -31,15 +30,7 @@ def command() -> None:
     help="Folder that keeps every machine's answer: what is there is not computed again.",
 )
 @click.option("--report", type=answer.WrittenFile(), help="Write a page (.html or .pdf).")
-@click.option(
-    "--workers", type=click.IntRange(1), help="Processes.  [default: one for each processor]"
-)
-@click.option(
-    "--scheduler",
-    default="",
-    metavar="ADDRESS",
-    help="Let the workers of a Dask scheduler do it, tcp://HOST:PORT.",
-)
+@spread_options
 @answer.json_option
 def fit(
     folders: tuple[str, ...],
@@ -61,7 +52,7 @@ def fit(
 
     if report is not None and report.suffix not in (".html", ".pdf"):
         raise click.BadParameter("a page ends in .html or .pdf", param_hint="--report")
-    with _progress() as watch:
+    with progress() as watch:
         found = fit_fleet(
             folders, add=add, out=out, workers=workers, scheduler=scheduler, watch=watch
         ).to_json()
@@ -69,21 +60,6 @@ def fit(
         _write(found, report)
         answer.say(f"written to {report}")
     answer.show(found, as_json, words(found))
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[int, int], None] | None]:
-    """A bar on standard error while a person looks on."""
-    if not answer.interactive():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
-
-    columns = (MofNCompleteColumn(), BarColumn(24), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=None)
-        yield lambda done, of: bar.update(task, completed=done, total=of)
 
 
 def _write(found: dict[str, Any], path: Path) -> None:

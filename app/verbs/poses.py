@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from app import answer
+from app.analysis_options import progress, spread_options
 from app.show.text_table import text_table
 from calib.defaults import POSES_FROM
 from calib.errors import BadInput
@@ -60,6 +61,14 @@ from calib.errors import BadInput
     type=float,
     help="Kept free at ends of strokes beyond what tolerances need.  [default: the site's, 0.1]",
 )
+@click.option(
+    "--searches",
+    type=click.IntRange(1),
+    default=1,
+    show_default=True,
+    help="Search with so many seeds, from --seed on, and keep the best.",
+)
+@spread_options
 @click.option("--verification", is_flag=True, help="Write the verification grid instead.")
 @click.option("--out", type=answer.WrittenFile(), help="Write a poses file for measure.")
 @answer.json_option
@@ -78,6 +87,9 @@ def command(
     candidates: int,
     seed: int,
     margin_mm: float | None,
+    searches: int,
+    workers: int | None,
+    scheduler: str,
     verification: bool,
     out: Path | None,
     as_json: bool,
@@ -97,7 +109,8 @@ def command(
     if verification:
         _verification(named, site_file, out, as_json)
         return
-    with answer.working(f"choosing {count} of {candidates} reachable poses"):
+    one = answer.working(f"choosing {count} of {candidates} reachable poses")
+    with progress() if searches > 1 else one as watch:
         chosen = choose_poses(
             named,
             count,
@@ -112,6 +125,10 @@ def command(
             candidates=candidates,
             seed=seed,
             margin_mm=margin_mm,
+            searches=searches,
+            workers=workers,
+            scheduler=scheduler,
+            watch=watch,
         )
     if out:
         chosen.save(out)
@@ -171,7 +188,7 @@ def _number(value: float | None) -> str:
 def _verification(
     named: str | None, site_file: Path | None, out: Path | None, as_json: bool
 ) -> None:
-    from app.jobs.posing import verification_grid
+    from app.jobs.verification_grid import verification_grid
 
     grid = verification_grid(named, site=site_file)
     if out:

@@ -11,7 +11,7 @@ from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.limits import Margin
 from calib.poses.choose import Candidates, Criterion, exchange, greedy
-from calib.poses.information import Accuracy, Judge, prior, whitened_rows
+from calib.poses.information import Accuracy, Judge, covariance, prior, whitened_rows
 from calib.poses.path import check_path, path_length, short_order
 from calib.poses.reach import PoseSet, sample_poses
 from calib.poses.readings import Readings
@@ -191,6 +191,19 @@ def design_poses(
         by_count=tuple(table),
         length=path_length(machine, pose_set.q),
     )
+
+
+def misses(design: Design, readings: Readings, fresh: PoseSet) -> float:
+    """How far off the platform is predicted to be at fresh poses, mm RMS, a turn by its ``LEVER``.
+
+    Designs that were sought apart are compared by it, at the same fresh poses.
+    """
+    known = prior(design.pose_set, readings, priors=design.priors)
+    rows = whitened_rows(design.pose_set, readings, known.scale)
+    flat = rows.reshape(len(rows), -1)
+    weight = Judge.over(fresh, readings, known.scale).weight(LEVER)
+    off = float(np.sum(covariance(known.information + flat @ flat.T) * weight))
+    return float(np.sqrt(max(off, 0.0)))
 
 
 def ordered(pose_set: PoseSet, margin: Margin | None = None) -> PoseSet:

@@ -16,7 +16,7 @@ SIGNATURES = {
     "check_machine": "machine, *, closure='', seed=1",
     "choose_poses": "machine=None, n=29, *, site=None, criterion='I', priors=True, "
     "heights=False, calipers=0, calipers_um=20.0, sigma_um=None, angle_mdeg=None, candidates=2500, "
-    "seed=1, margin_mm=None",
+    "seed=1, margin_mm=None, searches=1, workers=None, scheduler='', watch=None",
     "compare": "runs, *, add=(), model=None, propose=None, watch=None",
     "complete": "machine, *, tool=False",
     "correct": "model, poses, *, machine=None, payload=None, temperature=None, channels=None, "
@@ -31,7 +31,8 @@ SIGNATURES = {
     "guess_map": "files, out, *, machine=None",
     "history_of": "folder='sessions', *, serial='', tolerance_um=None",
     "identifiability": "machine, *, closure='', read='nests', nests=3, site=None, sigma_um=None, "
-    "frame_free=True, nests_free=False, base_nests=True, poses=None, only=(), seed=1",
+    "frame_free=True, nests_free=False, base_nests=True, poses=None, only=(), seed=1, "
+    "monte_carlo=0, workers=None, scheduler='', watch=None",
     "import_run": "files, map, run, *, machine=None, header=None, commands=None, "
     "as_it_stands=False",
     "iso9283": "run, *, point='', pairs=''",
@@ -42,7 +43,7 @@ SIGNATURES = {
     "mock_station": "machine='hexapod', *, seed=1, scale=600.0, effects=None, folder=None",
     "predict": "model, runs, *, frame=False",
     "sensitivity": "machine, *, closure='', position_um=None, orientation_mdeg=None, poses=500, "
-    "seed=1",
+    "seed=1, monte_carlo=0, workers=None, scheduler='', watch=None",
     "session_log": "session=None, *, folder='sessions'",
     "site_kinds": "name=None",
     "simulate": "machine, run, *, seed=1, poses=60, noise_um=None, effects=None, hidden=None, "
@@ -93,14 +94,15 @@ FIELDS = {
     "HistoryReport": "machines",
     "IdentifiabilityReport": "machine closure readings poses unknowns rank weak smallest_kept "
     "singular_values base_parameters relations exact_groups identified unidentified sigma_ratio "
-    "gauge subsets options",
+    "gauge subsets options drawn",
     "Iso9283Report": "machine point frame left_out poses distances largest",
     "KindsReport": "kinds",
     "MachineCheckReport": "machine limbs parameters actuators task home_gap_mm home_gap_rad "
     "home_pose constraints redundant freedoms_held mobility rank stiffness_home stiffness_least "
     "reach stopped_by used verification_box verification_scale closures traits_stated traits "
     "effects not_on_this_machine",
-    "SensitivityReport": "machine closure poses parameters kinds within_tolerances tolerances",
+    "SensitivityReport": "machine closure poses parameters kinds within_tolerances tolerances "
+    "drawn",
     "ImportReport": "runs machine map rows readings poses assumed record",
     "KinematicsReport": "machine model direction actuators units places",
     "LogReport": "session entries",
