@@ -60,6 +60,8 @@ class Reading:
     """The other end of a distance."""
     plane: str = ""
     """What a direction touches."""
+    value: float | None = None
+    """The same number in every row (mm, rad), where no column has it: a probe that triggers."""
 
 
 @dataclass(frozen=True)
@@ -267,8 +269,14 @@ def _one_number(table: TomlTable, kind: str, nest: str) -> Reading:
         raise table.wrong(f"a {kind} has no other end", "nest2", remedy="Leave nest2 out")
     if plane and kind != "direction":
         raise table.wrong(f"a {kind} touches no plane", "plane", remedy="Leave plane out")
-    numbers = numbers_of(table, 1, (NUMBERS[kind],))
-    return Reading(kind, numbers, nest, nest2=nest2, plane=plane)
+    if not table.has("value"):
+        numbers = numbers_of(table, 1, (NUMBERS[kind],))
+        return Reading(kind, numbers, nest, nest2=nest2, plane=plane)
+    if table.has("columns"):
+        raise table.wrong("value and columns both say what is read", "value", remedy="Keep one")
+    none = Numbers((), (), (), (), (), (), table.place("value"))
+    value = table.quantity("value", NUMBERS[kind], 0.0)
+    return Reading(kind, none, nest, nest2=nest2, plane=plane, value=value)
 
 
 def _spherical(table: TomlTable, kind: str, nest: str) -> Reading:

@@ -256,7 +256,10 @@ def angles(reader: Reader, reading: Reading, sigma: Sigma) -> dict[str, Array]:
 
 def one_number(reader: Reader, reading: Reading, sigma: Sigma) -> dict[str, Array]:
     """Columns (N,) of a reading of one number, mm or rad; nan where the row holds none."""
-    value = reader.numbers(reading.numbers)[0]
+    if reading.value is None:
+        value = reader.numbers(reading.numbers)[0]
+    else:
+        value = np.full(len(reader.table.rows), reading.value)
     spread = np.full(value.size, sigma.value or np.nan)
     if sigma.numbers is not None:
         spread = reader.numbers(sigma.numbers)[0]

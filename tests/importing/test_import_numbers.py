@@ -7,8 +7,13 @@ import numpy as np
 import pytest
 
 from app.cli import run as pkmcal
+from app.files.machines import load_machine
 from app.files.runs import read_run
 from app.files.time_forms import are_days, form_of
+from calib.identify import fit
+from calib.mechanism.solve import inverse
+from calib.model import Model
+from calib.runs.stack import stack
 
 HEAD = """format = "pkm-import/1"
 machine = "delta"
@@ -95,6 +100,35 @@ def test_what_a_number_cannot_be_is_refused(
     plan.write_text(HEAD.format(time="step_s = 5.0", reading=reading, sigma=sigma), "utf-8")
     assert pkmcal(["import", str(file), "--map", str(plan), "--out", str(tmp_path / "run")]) == 2
     assert said in capsys.readouterr().err
+
+
+def test_a_probe_that_triggers_is_its_radius_at_the_latched_axes(tmp_path: Path, capsys) -> None:
+    """Touches of a machine whose end stops are off; the ball's centre is 1.5 mm over the bed."""
+    machine = load_machine("delta-printer")
+    names = [parameter.name for parameter in machine.parameters]
+    real = machine.nominal.copy()
+    real[[names.index(f"tower{k}.zero") for k in (1, 2, 3)]] = 0.4, -0.3, 0.1
+    x, y = np.meshgrid(np.linspace(-50.0, 50.0, 4), np.linspace(-50.0, 50.0, 4))
+    task = np.array([x.ravel(), y.ravel(), np.full(16, 41.5)])
+    q = machine.coordinates(inverse(machine, task, real).extension)
+    file, plan = tmp_path / "touches.csv", tmp_path / "map.toml"
+    rows = [f"{k},{','.join(f'{value:.6f}' for value in q[:, k])}" for k in range(16)]
+    file.write_text("\n".join(["Nr,q1[mm],q2[mm],q3[mm]", *rows, ""]))
+    text = HEAD.format(
+        time="step_s = 5.0", reading='kind = "direction"\nplane = "bed"\nvalue = "1.5 mm"',
+        sigma="1 um",
+    )  # fmt: skip
+    text = text.replace('"delta"', '"delta-printer"').replace('columns = ["Höhe"]\n', "")
+    text = text.replace('delimiter = ";"\ndecimal = ","\n', "").replace("90.0]", "40.0]")
+    plan.write_text(text, "utf-8")
+    out = str(tmp_path / "run")
+    assert pkmcal(["import", str(file), "--map", str(plan), "--out", out]) == 0
+    found = fit(Model(stack(machine, [read_run(Path(out)).run])))
+    assert found.rms_mm < 1e-4
+    assert found.values[:9] == pytest.approx(real, abs=0.02)
+    plan.write_text(text.replace('value = "1.5 mm"', 'value = "1.5 mm"\ncolumns = ["q1"]'))
+    assert pkmcal(["import", str(file), "--map", str(plan), "--out", out + "2"]) == 2
+    assert "both say what is read" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("sigma", ["0", "-0,01", "", "nan", "wide"])

@@ -101,6 +101,17 @@ nest2 = "b1"
 [sigma]
 value = "1 mm"
 """,
+    BEGIN.format(time="step_s = 1.0")
+    + """
+[actuators]
+columns = 1
+[[reading]]
+kind = "direction"
+value = "1.5 mm"
+plane = "bed"
+[sigma]
+value = "1 mm"
+""",
 )
 SHARED = (
     r"(instruments|planes)\..*|(?!actuators).*\.(unit|sign|gear|scale|offset)|"
