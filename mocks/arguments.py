@@ -11,6 +11,15 @@ WITH_OWN_FILES = ("hexapod", "ptm")
 """Mechanisms whose mock takes a machine file of one's own: those with a controller on CANopen."""
 
 
+def hidden_number(text: str) -> tuple[str, float]:
+    """NAME=VALUE; raises :class:`argparse.ArgumentTypeError`."""
+    name, _, value = text.partition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'"{text}" is no NAME=VALUE') from None
+
+
 def parser() -> argparse.ArgumentParser:
     """What ``pkmcal mock`` understands."""
     parser = argparse.ArgumentParser(
@@ -32,6 +41,10 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
     parser.add_argument("--truth", type=Path, help="true parameters (TOML or JSON)")
     parser.add_argument("--hidden", type=Path, help="hidden effects (TOML or JSON)")
+    parser.add_argument(
+        "--effect", action="append", type=hidden_number, metavar="NAME=VALUE", default=[],
+        help="a hidden effect, backlash.leg3=0.015 for instance; repeatable (docs/mocks.md)",
+    )  # fmt: skip
     parser.add_argument("--nvm", type=Path, help="file of the controller's stored parameters")
     parser.add_argument("--serial", type=int, help="of the controller; else one for each --nvm")
     parser.add_argument(

@@ -263,6 +263,8 @@ def build(options: argparse.Namespace) -> MockStation:
         else draw_parameters(machine, options.seed)
     )
     hidden = Hidden.read(options.hidden) if options.hidden is not None else Hidden()
+    if options.effect:
+        hidden = Hidden({**hidden.values, **dict(options.effect)})
     plan = WorldPlan(
         seed=options.seed,
         parameters=parameters,

@@ -39,6 +39,7 @@ from app.session.events import (
 )
 from app.session.folder import RUN, make_folder, read_folder
 from app.session.journal import PLANNED, Journal, StepState
+from app.session.pace import Pace
 from app.session.plan import Plan, Step
 from app.session.recall import recall
 from app.session.routines import ROUTINES
@@ -281,16 +282,15 @@ class Session:
         return self._finish()
 
     async def _drive(self) -> None:
-        begun = asyncio.get_running_loop().time()
-        at_start = self._done_count()
-        while due := self.due():
+        pace, now = Pace(), asyncio.get_running_loop().time
+        due = self.due()
+        while due:
             await self._going.wait()
+            begun = now()
             await self._do(self.plan.steps.index(due[0]), due[0])
-            done = self._done_count()
-            spent = asyncio.get_running_loop().time() - begun
-            rate = (done - at_start) / spent if spent > 0.0 else 0.0
-            left = (len(self.plan.steps) - done) / rate if rate > 0.0 else None
-            self.observers.tell(Progress(done, len(self.plan.steps), left))
+            pace.took(due[0], now() - begun)
+            due = self.due()
+            self.observers.tell(Progress(self._done_count(), len(self.plan.steps), pace.left(due)))
 
     def _done_count(self) -> int:
         return sum(not state.pending for state in self.journal.states().values())

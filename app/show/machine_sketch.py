@@ -23,6 +23,8 @@ class Around:
         Centres of nests, each a small square.
     beam : (3, 2), optional
         From an SMR to the tracker; what is outside of the drawing is not seen.
+    arrows : (3, 2, K)
+        Begin and end of what is drawn by :func:`two_arrows`.
     room : (3, 2), optional
         Least and largest corner of what is shown; the machine's own if None. With one room a
         machine that moves stays where it is in the drawing.
@@ -31,6 +33,7 @@ class Around:
     nests: Array = field(default_factory=lambda: np.zeros((3, 0)))
     beam: Array | None = None
     room: Array | None = None
+    arrows: Array = field(default_factory=lambda: np.zeros((3, 2, 0)))
 
 
 def corners_of(skeleton: Skeleton) -> Array:
@@ -44,9 +47,7 @@ def draw_view(
 ) -> list[str]:
     """One view as lines of characters."""
     plane = list(axes)
-    shown = corners_of(skeleton) if around.room is None else around.room
-    flat = shown[plane]
-    canvas = Canvas(columns, rows, flat.min(axis=1), flat.max(axis=1))
+    canvas = _canvas(skeleton, axes, columns, rows, around)
     for limb in skeleton.limbs:
         _chain(canvas, limb.corners[plane, limb.first : limb.last + 1])
         for joint in limb.joints:
@@ -61,6 +62,25 @@ def draw_view(
     return canvas.lines()
 
 
+def draw_arrows(
+    skeleton: Skeleton, axes: tuple[int, int], columns: int, rows: int, around: Around
+) -> list[str]:
+    """The arrows alone, in the place of :func:`draw_view`; each has a square where it begins."""
+    canvas = _canvas(skeleton, axes, columns, rows, around)
+    for begin, end in around.arrows[list(axes)].transpose(2, 1, 0):
+        canvas.line(begin, end)
+        canvas.mark(begin)
+    return canvas.lines()
+
+
+def _canvas(
+    skeleton: Skeleton, axes: tuple[int, int], columns: int, rows: int, around: Around
+) -> Canvas:
+    shown = corners_of(skeleton) if around.room is None else around.room
+    flat = shown[list(axes)]
+    return Canvas(columns, rows, flat.min(axis=1), flat.max(axis=1))
+
+
 def _chain(canvas: Canvas, points: Array) -> None:
     for k in range(1, points.shape[1]):
         canvas.line(points[:, k - 1], points[:, k])
@@ -69,10 +89,15 @@ def _chain(canvas: Canvas, points: Array) -> None:
 def two_views(skeleton: Skeleton, columns: int, rows: int, around: Around) -> tuple[str, str]:
     """Front and above side by side: a line of headings, and the drawing."""
     width = (columns - 2) // 2
-    views: Sequence[list[str]] = [
-        draw_view(skeleton, axes, width, rows, around) for axes in (FRONT, ABOVE)
-    ]
+    views = [draw_view(skeleton, axes, width, rows, around) for axes in (FRONT, ABOVE)]
     return f"{'front (x, z)':{width}}  from above (x, y)", beside(views[0], views[1])
+
+
+def two_arrows(skeleton: Skeleton, columns: int, rows: int, around: Around) -> str:
+    """The arrows of both views, sign over sign with the drawing of :func:`two_views`."""
+    width = (columns - 2) // 2
+    views = [draw_arrows(skeleton, axes, width, rows, around) for axes in (FRONT, ABOVE)]
+    return beside(views[0], views[1])
 
 
 def draw_text(skeleton: Skeleton, columns: int, rows: int) -> str:

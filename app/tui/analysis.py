@@ -2,20 +2,27 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from app.analysis import load_rows, masked_rows
+from app.analysis import looked_at, masked_rows
+from app.files.fits import read_fit
+from app.files.models import offered_effects
+from app.files.runs import read_runs
 from app.jobs.remembering import remember_fit
 from app.tui.reading_lines import ReadingLine, lines_of_fit
 from calib.arrays import Array
+from calib.effects import Effect, effect_named
+from calib.formulas.effect_file import effect_from_text
 from calib.identify import Fit, fit_report
 from calib.identify.staged import fit_effects
 from calib.identify.starting import begin
 from calib.look.judged import record_of
 from calib.model import Model
 from calib.runs.remark import plain_remarks
+from calib.runs.stack import Rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +48,41 @@ class FitAnswer:
         return 1000.0 * float(np.sqrt(np.mean(self.miss_before**2)))
 
 
+@dataclass(frozen=True)
+class OwnEffects:
+    """Where effects come from that are not of the program: the site's files, and a model file."""
+
+    offers: tuple[Path, ...] = ()
+    model: Path | None = None
+
+    def by_name(self) -> dict[str, Effect]:
+        """Read them; raises BadInput with file and line."""
+        found: dict[str, Effect] = {one.id: one for one in offered_effects(self.offers)}
+        if self.model is not None:
+            own = read_fit(self.model).own
+            place = f"{self.model}, own_effects"
+            found |= {name: effect_from_text(text, place) for name, text in own.items()}
+        return found
+
+
+def load_named(
+    runs: tuple[str, ...], effects: tuple[str, ...], own: OwnEffects
+) -> tuple[Rows, list[Effect]]:
+    """Read runs, and find the effects of these names, and what the record itself shows."""
+    loaded, known = read_runs(runs), own.by_name()
+    machine = loaded[0].machine
+    chosen = [known.get(name) or effect_named(name, machine) for name in effects]
+    return looked_at(loaded, chosen)
+
+
 def identify(
-    runs: tuple[str, ...], effects: tuple[str, ...] = (), masked: Sequence[str] = ()
+    runs: tuple[str, ...],
+    effects: tuple[str, ...] = (),
+    masked: Sequence[str] = (),
+    own: OwnEffects = OwnEffects(),
 ) -> FitAnswer:
     """Read runs and fit them without the masked lines; raises BadInput."""
-    rows, chosen = load_rows(runs, effects)
+    rows, chosen = load_named(runs, effects, own)
     found = fit_effects(rows, chosen, masked_rows(rows, masked))
     remember_fit(found, runs)
     return answer_of(runs, found)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Collection, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import ClassVar
 
 from rich.text import Text
@@ -14,6 +15,7 @@ from textual.widgets import DataTable, Static
 
 from app.session.events import GateChecked
 from app.session.known import Snapshot
+from app.tui.choosing import choose_model
 from app.tui.correction import Comparison
 from app.tui.dialogs import Choose, Pick
 from app.tui.face import Face
@@ -38,6 +40,7 @@ class ApplyFace(Face):
     label = "Apply"
     about = (
         "c compares the fit with what the controller holds and asks the gates; nothing is written. "
+        "l compares a model file instead, one of an earlier day for instance. "
         "a writes to volatile memory, reads back bit for bit, measures check poses before and "
         "after, asks you, and only then stores. Any failure, and the stop key, puts the earlier "
         "set back. u brings back any earlier set. t takes what the controller holds as known, "
@@ -46,6 +49,9 @@ class ApplyFace(Face):
     AUTO_FOCUS: ClassVar[str | None] = "#apply-table"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("c", "compare", "Compare", tooltip="Compare fit and controller; ask the gates"),
+        Binding(
+            "l", "load", "Load model", tooltip="Compare a model file with the controller instead"
+        ),
         Binding("a", "apply", "Apply", tooltip="Write, try on check poses, then keep or put back"),
         Binding("u", "undo", "Undo", tooltip="Bring back an earlier parameter set"),
         Binding("t", "accept", "Take as known", tooltip="Accept what the controller holds now"),
@@ -112,13 +118,23 @@ class ApplyFace(Face):
             most=22,
             gap=2 if self.wide else 1,
         )
-        table.border_subtitle = f"{len(changes)} values, largest first; a writes them"
+        whose = f" of {comparison.model}" if comparison.loaded else ""
+        table.border_subtitle = f"{len(changes)} values{whose} in mm, rad; largest first"
 
     # keys
 
     def action_compare(self) -> None:
         """Compare."""
         self.act(self.desk.corrections.compare, busy="comparing fit and controller ...")
+
+    def action_load(self) -> None:
+        """Choose a model file and compare it."""
+
+        def compare(model: Path) -> None:
+            busy = f"comparing {model} and controller ..."
+            self.act(lambda: self.desk.corrections.compare(model), busy=busy)
+
+        choose_model(self, compare)
 
     def action_apply(self) -> None:
         """Ask once more, then write."""
@@ -219,15 +235,15 @@ def gates_text(gates: Sequence[GateChecked], *, wide: bool, brief: bool) -> Cont
     passed = [gate for gate in gates if gate.passed]
     lines = []
     for gate in refused:
-        lines.append(Content.assemble(("✗ ", "bold $error"), _numbers(gate)))
+        lines.append(Content.assemble(("✗ ", "bold $ink-error"), _numbers(gate)))
         lines.append(Content(f"  {_reason(gate)}"))
     if brief and passed:
         names = ", ".join(gate.gate for gate in passed)
-        lines.append(Content.assemble(("✓ ", "$success"), f"passed: {names}"))
+        lines.append(Content.assemble(("✓ ", "$ink-success"), f"passed: {names}"))
         return Content("\n").join(lines)
     for gate in passed:
         reason = f" {_reason(gate)}" if wide else ""
-        lines.append(Content.assemble(("✓ ", "$success"), _numbers(gate), (reason, "dim")))
+        lines.append(Content.assemble(("✓ ", "$ink-success"), _numbers(gate), (reason, "dim")))
     return Content("\n").join(lines)
 
 
@@ -245,7 +261,7 @@ def stages_text(picture: Picture, left_out: Mapping[str, str]) -> Content:
     if not picture.stages:
         lines = [Content.from_markup("[dim]nothing written[/]")]
         for name, why in left_out.items():
-            text = Content.assemble((f"– {name} ", "$warning"), f"will not be: {why}")
+            text = Content.assemble((f"– {name} ", "$ink-warning"), f"will not be: {why}")
             lines.append(text)
         return Content("\n").join(lines)
     lines = []
@@ -253,7 +269,7 @@ def stages_text(picture: Picture, left_out: Mapping[str, str]) -> Content:
         last = number == len(picture.stages) - 1
         bad = stage.stage in ("restore", "restore-failed")
         sign = "✗" if bad else "▶" if last and picture.busy else "✓"
-        style = "bold $error" if bad else "$accent" if sign == "▶" else "$success"
+        style = "bold $ink-error" if bad else "$ink-accent" if sign == "▶" else "$ink-success"
         lines.append(Content.assemble((f"{sign} ", style), stage.says))
     return Content("\n").join(lines)
 

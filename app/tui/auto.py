@@ -119,8 +119,8 @@ def goal_text(flight: Automatic, lines: Sequence[Mapping[str, Any]]) -> Content:
     limits = flight.limits
     if limits is None:
         return Content.from_markup(
-            "[bold $accent]n[/] says which accuracy is wanted, and begins;\n"
-            "[bold $accent]g[/] goes on with one that ended early."
+            "[bold $ink-accent]n[/] says which accuracy is wanted, and begins;\n"
+            "[bold $ink-accent]g[/] goes on with one that ended early."
         )
     done, found = of(lines, "done"), of(lines, "found")
     poses = sum(int(line.get("poses", 0)) for line in done)
@@ -148,7 +148,7 @@ def _against(name: str, value: float | None, target: float, more: str = "") -> C
     filled = min(BAR, round(BAR * value / (2.0 * target)))
     signs = ["█"] * filled + ["·"] * (BAR - filled)
     signs[BAR // 2] = "┃"
-    style = "$success" if value <= target else "$warning"
+    style = "$ink-success" if value <= target else "$ink-warning"
     mark = "✓" if value <= target else "!"
     return Content.assemble(
         (f"{name:<12}", "dim"), f"{value:7.1f} µm ", ("".join(signs), style), f" {mark}  {more}"
@@ -207,7 +207,7 @@ def decided_text(lines: Sequence[Mapping[str, Any]]) -> Content:
                 )
                 blocks.append([head])
             case "done" if blocks and _came(line):
-                sign = ("– ", "$warning") if line.get("vetoed") else ("✓ ", "$success")
+                sign = ("– ", "$ink-warning") if line.get("vetoed") else ("✓ ", "$ink-success")
                 blocks[-1].append(Content.assemble("   ", sign, _came(line)))
             case "found" if blocks:
                 blocks[-1].append(Content(f"   {micro(found_words(line))}"))

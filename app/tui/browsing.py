@@ -28,7 +28,7 @@ class Wanted(DirectoryTree):
 class Browse(Dialog[str]):
     """A tree of folders; enter opens one, or takes a file. ``up`` goes above where it began."""
 
-    escape_says: ClassVar[str] = "enter: open or take   backspace: the folder above   esc: close"
+    escape_says: ClassVar[str] = "enter: open, take   backspace: up   esc: close"
     BINDINGS = [("backspace", "up", "Above")]  # noqa: RUF012 - Textual's own
 
     def __init__(self, title: str, text: str, root: Path, wanted: Callable[[Path], bool]) -> None:

@@ -35,6 +35,8 @@ class Comparison:
     model: Path
     proposal: Proposal
     gates: tuple[ev.GateChecked, ...]
+    loaded: bool = False
+    """The model is a file that the operator chose, not the fit on the Fit screen."""
 
     @property
     def passed(self) -> bool:
@@ -52,10 +54,13 @@ class Corrections:
         self.running: WriteBack | None = None
         self._answer: asyncio.Future[str] | None = None
 
-    async def compare(self) -> None:
-        """Read the controller and judge the fit on the Fit screen; nothing is written."""
+    async def compare(self, loaded: Path | None = None) -> None:
+        """Read the controller and judge the fit on the Fit screen; nothing is written.
+
+        ``loaded``: a model file that takes the place of that fit.
+        """
         station = self._desk.idle_station("compare")
-        model = self.model_file()
+        model = self.model_file() if loaded is None else loaded
         controller = station.controller
         held = await compare_with_known(station.site, controller)
         told = await controller.frame() if isinstance(controller, HostedController) else {}
@@ -64,7 +69,7 @@ class Corrections:
             fit = read_fit(model)
             serial = controller.identity.serial
             proposal, checked = judged(station.site, Gates.with_limits({}), fit, held, serial, told)
-            return Comparison(model, proposal, tuple(checked))
+            return Comparison(model, proposal, tuple(checked), loaded is not None)
 
         # Arithmetic goes beside the event loop: stop key and drivers must not wait for it.
         self.comparison = await asyncio.to_thread(judge)

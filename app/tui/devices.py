@@ -12,9 +12,8 @@ from textual.widgets import Static
 from app.files.site import Site
 from app.session.events import Connected
 from app.session.facts import SessionFacts, sessions_under
-from app.tui.browsing import Browse
-from app.tui.choosing import BROWSE, TYPE
-from app.tui.dialogs import Choose, Enter, Pick, is_site_file, site_candidates
+from app.tui.choosing import IS_SITE, choose_file, here
+from app.tui.dialogs import Choose, Enter
 from app.tui.face import Face
 from app.tui.next_step import job_steps
 from app.tui.picture import Picture
@@ -125,33 +124,18 @@ class DevicesFace(Face):
     # keys
 
     def action_open_site(self) -> None:
-        """Choose among the site files here, or type a path."""
-        found = [
-            *site_candidates(Path()),
-            (BROWSE, "another file: look for it in the folders"),
-            (TYPE, "another file: type its path"),
-        ]
+        """Choose among the site files here, or another one."""
 
-        def opened(answer: str | None) -> None:
-            if answer:
-                self.act(lambda: self.desk.open_site(Path(answer).expanduser()))
+        def opened(path: Path) -> None:
+            self.act(lambda: self.desk.open_site(path))
 
-        def picked(answer: str | None) -> None:
-            if answer == BROWSE:
-                text = "Open folders down to the site file, and take it"
-                self.app.push_screen(Browse("Open site", text, Path(), is_site_file), opened)
-            elif answer == TYPE:
-                self.app.push_screen(Enter("Open site", "Path of the site file"), opened)
-            else:
-                opened(answer)
-
-        self.app.push_screen(Pick("Open site", "Site files found here", found), picked)
+        choose_file(self, "Open site", here(Path(), IS_SITE), IS_SITE, opened, "site file")
 
     def action_mock(self) -> None:
         """Ask for the mock's arguments and start it."""
         text = (
             "A mock machine with its tracker starts as a process of its own and ends with this "
-            "program. Arguments as for pkmcal mock:"
+            "program. Arguments as for pkmcal mock (--effect backlash.leg3=0.015 hides an effect):"
         )
 
         def entered(answer: str | None) -> None:
@@ -239,7 +223,7 @@ def identity_line(link: Connected | None) -> Content:
     serial = f"   serial {who.serial}" if who.serial else ""
     firmware = f"   firmware {who.firmware}" if who.firmware else ""
     return Content.from_markup(
-        "[$success]●[/] [bold]$names[/]$rest", names=names, rest=serial + firmware
+        "[$ink-success]●[/] [bold]$names[/]$rest", names=names, rest=serial + firmware
     )
 
 
@@ -269,7 +253,7 @@ def actuator_line(actuator: ActuatorState) -> Content:
         f"{homed:<5}  {actuator.state}"
     )
     if actuator.fault:
-        return Content.assemble(text, (f"  ✗ {actuator.fault}", "bold $error"))
+        return Content.assemble(text, (f"  ✗ {actuator.fault}", "bold $ink-error"))
     return Content(text)
 
 
@@ -286,9 +270,9 @@ def tracker_text(link: Connected | None, state: TrackerState | None) -> Content:
             (state.locked, "beam locked", "no beam"),
         )
         signs = [
-            Content.from_markup("[$success]✓[/] $yes", yes=yes)
+            Content.from_markup("[$ink-success]✓[/] $yes", yes=yes)
             if flag
-            else Content.from_markup("[$warning]✗ $no[/]", no=no)
+            else Content.from_markup("[dim]·[/] $no", no=no)  # a job sees to it
             for flag, yes, no in flags
         ]
         signs.append(Content(f"{state.reflector or 'no reflector'}  face {state.face}"))
@@ -302,7 +286,7 @@ def gauge_text(link: Connected | None, state: GaugeState | None) -> Content:
     if link is not None and state is None:
         lines.append(Content("no answer to the last question; see the alarms"))
     if state is not None:
-        sign = "[$success]✓[/] $said" if state.ready else "[$warning]✗ no number[/]: $said"
+        sign = "[$ink-success]✓[/] $said" if state.ready else "[$ink-warning]✗ no number[/]: $said"
         lines.append(Content.from_markup(sign, said=state.last or "not read yet"))
     return Content("\n").join(lines)
 
@@ -313,7 +297,7 @@ def alarms_text(picture: Picture, most: int) -> Content:
         return Content.from_markup("[dim]no alarms[/]")
     lines = []
     for time_s, alarm in reversed(list(picture.alarms)[-most:]):
-        sign, style = ("✗", "bold $error") if alarm.fault else ("!", "$warning")
+        sign, style = ("✗", "bold $ink-error") if alarm.fault else ("!", "$ink-warning")
         line = Content.assemble(
             (f"{sign} {time_s:.0f} s ", style), (f"{alarm.device}: ", "bold"), alarm.what
         )

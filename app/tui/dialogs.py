@@ -1,7 +1,6 @@
 """Dialogs. Each shows the stop key, which works in all of them, and can be left with escape."""
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import ClassVar, TypeVar
 
 from textual import on
@@ -241,25 +240,8 @@ class Help(Dialog[None]):
         second = max(len(what) for _, what, _ in self._keys)
         lines = []
         for key, what, why in self._keys:
-            line = Content.assemble((f"{key:>{width}}", "bold $accent"), f"  {what:<{second}}")
+            line = Content.assemble((f"{key:>{width}}", "bold $ink-accent"), f"  {what:<{second}}")
             lines.append(Content.assemble(line, (f"  {why}", "dim")))
         with VerticalScroll(classes="dialog-help"):
             yield Static(Content(self._about + "\n"))
             yield Static(Content("\n").join(lines))
-
-
-def site_candidates(folder: Path) -> list[tuple[str, str]]:
-    """Find site files under a folder (one level deep): path, and what to show."""
-    found = sorted({*folder.glob("*.toml"), *folder.glob("*/*.toml")})
-    return [(str(path), str(path)) for path in found[:200] if is_site_file(path)]
-
-
-def is_site_file(path: Path) -> bool:
-    """Whether a file says that it is a site."""
-    if path.suffix != ".toml":
-        return False
-    try:
-        with path.open(encoding="utf-8", errors="replace") as text:
-            return "pkm-site/1" in text.read(400)
-    except OSError:
-        return False

@@ -12,7 +12,7 @@ from textual.content import Content
 from textual.widgets import DataTable, Static
 
 from app.show.record_words import remark_lines
-from app.tui.choosing import ask_for_model_file, choose_runs
+from app.tui.choosing import ask_for_model_file, begin_with_model, choose_runs
 from app.tui.dialogs import Pick
 from app.tui.face import Face
 from app.tui.picture import Picture
@@ -61,6 +61,9 @@ class DiscoverFace(Face):
             "Residuals",
             show=False,
             tooltip="Reading by reading: what is left, where, and masking by hand",
+        ),
+        Binding(
+            "l", "load", "Load model", show=False, tooltip="Begin with the effects of a model file"
         ),
         Binding("s", "save", "Save", tooltip="Write the model to a file, for fit and apply"),
     ]
@@ -136,6 +139,10 @@ class DiscoverFace(Face):
         """Choose a run of the sessions, or type folders."""
         choose_runs(self, self.action_diagnose)
 
+    def action_load(self) -> None:
+        """Take the effects of a model file, and ask with them."""
+        begin_with_model(self, self.action_diagnose)
+
     def action_save(self) -> None:
         """Write a model file."""
         ask_for_model_file(self)
@@ -187,7 +194,7 @@ def stairs_text(search: "Search | None", room: int, most: int) -> Content:
     """The error after the last steps; a bar of ``room`` signs: noise, and what is left."""
     if search is None:
         return Content.from_markup(
-            "[bold $accent]d[/] asks what the model of the\nchosen run misses"
+            "[bold $ink-accent]d[/] asks what the model of the\nchosen run misses"
         )
     shown = search.stairs[-most:]
     top = max(stair.rms_um for stair in search.stairs)
@@ -199,7 +206,7 @@ def stairs_text(search: "Search | None", room: int, most: int) -> Content:
         lines.append(Content.assemble((line, "bold" if last else ""), bar(stair, top, room)))
     floor = shown[-1]
     line = f"{'perfect':<14}{floor.floor_um:6.2f}{_um(floor.holdout_floor_um)}"
-    lines.append(Content.assemble((line, "$success")))
+    lines.append(Content.assemble((line, "$ink-success")))
     return Content("\n").join(lines)
 
 
@@ -207,7 +214,7 @@ def bar(stair: "Stair", top: float, room: int) -> Content:
     """A bar as long as the RMS: the part that a perfect model would leave, and the rest."""
     noise = round(room * min(stair.floor_um, stair.rms_um) / top)
     rest = max(0, round(room * stair.rms_um / top) - noise)
-    return Content.assemble(("░" * noise, "dim"), ("█" * rest, "$accent"))
+    return Content.assemble(("░" * noise, "dim"), ("█" * rest, "$ink-accent"))
 
 
 def _um(value: float) -> str:
@@ -225,7 +232,7 @@ def fails_text(view: "View | None", shown: int, wide: bool) -> Content:
     structure = view.comparison["structure"]
     lines = []
     for number, each in enumerate(structure[: 12 if wide else 5]):
-        sign, style = ("!", "$warning") if each["significant"] else ("·", "dim")
+        sign, style = ("!", "$ink-warning") if each["significant"] else ("·", "dim")
         period = f", period {each['period']:.3g}" if each["period"] else ""
         mark = "▸" if wide and number == shown % len(structure) else " "
         p = f"  p {p_text(each['p_value'])}" if wide else ""
@@ -246,11 +253,11 @@ def advice_text(view: "View | None") -> Content:
     if view is None:
         return Content("")
     diagnosis = view.diagnosis
-    mark = ("✓ ", "$success") if diagnosis["adequate"] else ("! ", "$warning")
+    mark = ("✓ ", "$ink-success") if diagnosis["adequate"] else ("! ", "$ink-warning")
     told = [
         said for said in remark_lines(diagnosis) if said.split(". ")[0] not in diagnosis["advice"]
     ]
-    first = [(f"{micro(said)}\n", "$warning") for said in told]
+    first = [(f"{micro(said)}\n", "$ink-warning") for said in told]
     text = Content.assemble(*first, mark, micro(diagnosis["advice"]))
     for group in diagnosis["indistinguishable"]:
         if all(name in diagnosis["advice"] for name in group):

@@ -3,13 +3,12 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from app.analysis import load_rows, masked_rows
-from app.files.models import offered_effects
+from app.analysis import masked_rows
+from app.tui.analysis import OwnEffects, load_named
 from calib.discover.compare import compare_fit
 from calib.discover.compare_report import compare_report
 from calib.discover.diagnosis import RunDiagnosis
@@ -64,17 +63,17 @@ class Search:
     def of(
         runs: tuple[str, ...],
         effects: tuple[str, ...] = (),
-        offers: Sequence[Path] = (),
+        own: OwnEffects = OwnEffects(),  # noqa: B008 - frozen
         masked: Sequence[str] = (),
     ) -> "Search":
-        """Load runs and look at the model with these effects; ``offers`` are candidates too.
+        """Load runs and look at the model with these effects; ``own`` ones are candidates too.
 
         ``masked`` are lines of readings that are left out.
         """
-        rows, chosen = load_rows(runs, effects)
+        rows, chosen = load_named(runs, effects, own)
         # What the record itself shows is in the model from the start.
-        candidates = (*catalogue(rows.machine), *offered_effects(offers, chosen), *chosen)
-        known = {effect.id: effect for effect in candidates}
+        known = {effect.id: effect for effect in catalogue(rows.machine)}
+        known |= own.by_name() | {effect.id: effect for effect in chosen}
         search = Search(
             runs, Refitter(rows, tuple(known.values()), masked=masked_rows(rows, masked))
         )

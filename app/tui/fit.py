@@ -12,7 +12,7 @@ from textual.content import Content
 from textual.widgets import DataTable, Static
 
 from app.show.record_words import excluded_lines, remark_lines
-from app.tui.choosing import ask_for_model_file, choose_runs
+from app.tui.choosing import ask_for_model_file, begin_with_model, choose_runs
 from app.tui.face import Face
 from app.tui.picture import Picture
 from app.tui.widgets.plots import PairPlot
@@ -39,13 +39,14 @@ class FitFace(Face):
     AUTO_FOCUS: ClassVar[str | None] = "#fit-table"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("f", "fit", "Fit", tooltip="Fit the run that is chosen, or the latest"),
-        Binding("o", "choose", "Choose run", tooltip="Choose or type the runs to fit"),
+        Binding("o", "choose", "Run", tooltip="Choose or type the runs to fit"),
         Binding(
             "e",
             "app.show_side('residuals')",
             "Residuals",
             tooltip="Reading by reading: what is left, where, and masking by hand",
         ),
+        Binding("l", "load", "Load model", tooltip="Fit with the effects of a model file"),
         Binding("s", "save", "Save model", tooltip="Write what was found to a model file"),
     ]
 
@@ -107,6 +108,10 @@ class FitFace(Face):
         """Choose a run of the sessions, or type folders."""
         choose_runs(self, self.action_fit)
 
+    def action_load(self) -> None:
+        """Take the effects of a model file, and fit with them."""
+        begin_with_model(self, self.action_fit)
+
     def action_save(self) -> None:
         """Write a model file."""
         ask_for_model_file(self)
@@ -117,7 +122,8 @@ def summary(answer: "FitAnswer | None", runs: tuple[str, ...]) -> Content:
     if answer is None:
         which = f"Run: {_short(runs)}\n" if runs else ""
         return Content.from_markup(
-            which + "[bold $accent]f[/] fits the latest run\n[bold $accent]o[/] chooses another"
+            which
+            + "[bold $ink-accent]f[/] fits the latest run\n[bold $ink-accent]o[/] chooses another"
         )
     report = answer.report
     effects = ", ".join(report["effects"]) or "geometry only"
@@ -159,18 +165,19 @@ def words(answer: "FitAnswer | None") -> Content:
     report = answer.report
     chi2 = report["chi2_per_dof"]
     parts: list[Content] = [
-        Content.from_markup("[$warning]![/] $said", said=micro(said))
+        Content.from_markup("[$ink-warning]![/] $said", said=micro(said))
         for said in remark_lines(report)
     ]
     if chi2 is not None and chi2 > 1.25:
         parts.append(
             Content.from_markup(
-                "[$warning]![/] More is left than noise: an effect is missing, or the readings' "
-                "uncertainties are too small."
+                "[$ink-warning]![/] More is left than noise: an effect is missing, or the "
+                "readings' uncertainties are too small."
             )
         )
     parts += [
-        Content.from_markup("[$warning]✗[/] $told", told=told) for told in excluded_lines(report)
+        Content.from_markup("[$ink-warning]✗[/] $told", told=told)
+        for told in excluded_lines(report)
     ]
     if report["left_out_readings"]:
         parts.append(
@@ -190,7 +197,7 @@ def words(answer: "FitAnswer | None") -> Content:
             )
         )
     if not parts:
-        parts = [Content.from_markup("[$success]✓[/] Nothing is left open.")]
+        parts = [Content.from_markup("[$ink-success]✓[/] Nothing is left open.")]
     return Content("\n").join(parts)
 
 

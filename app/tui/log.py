@@ -11,7 +11,8 @@ from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
 from app.tui.face import Face
-from app.tui.picture import LogLine, Picture
+from app.tui.parts import LogLine
+from app.tui.picture import Picture
 from app.tui.theme import LEVELS, tinted
 
 

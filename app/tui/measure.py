@@ -137,8 +137,8 @@ def now_text(picture: Picture, wide: bool, axes: Sequence[Axis]) -> Content:
     """
     if not picture.steps:
         return Content.from_markup(
-            "No job.  [bold $accent]n[/] starts a new run,\n"
-            "[bold $accent]g[/] goes on with one that ended early."
+            "No job.  [bold $ink-accent]n[/] starts a new run,\n"
+            "[bold $ink-accent]g[/] goes on with one that ended early."
         )
     rows = [
         ("step", _step(picture)),
@@ -190,7 +190,7 @@ def _scatter(picture: Picture) -> Content:
         return Content("-")
     filled = min(8, round(8 * last.std_mm / last.limit_mm)) if last.limit_mm > 0 else 8
     bar = "█" * filled + "░" * (8 - filled)
-    word = ("settled", "$success") if last.settled else ("settling", "$warning")
+    word = ("settled", "$ink-success") if last.settled else ("settling", "$ink-warning")
     return Content.assemble(
         f"{bar} {last.std_mm * 1000:.1f} of {last.limit_mm * 1000:.0f} µm  ", word
     )
@@ -203,6 +203,8 @@ def _reading(picture: Picture) -> Content:
     if last is None:
         return Content("-")
     aside = f", {picture.rejected} set aside" if picture.rejected else ""
+    if picture.last_rough:
+        return Content(f"nest {last.nest}: to find the base by{aside}")
     miss = plus_minus(last.miss_mm * 1000, last.sigma_mm * 1000, "µm", sign="±")
     return Content(f"nest {last.nest}: off by {miss}{aside}")
 

@@ -28,21 +28,25 @@ def job_steps(desk: "Desk") -> list[JobStep]:
     fitted = study.answer is not None or view is not None
     adequate = view is not None and bool(view.diagnosis["adequate"])
     asking = "4 d" if view is None else "4 g"
+    broken = desk.picture.run in ("stopped", "fault") and desk.session is not None
+    ended = desk.picture.purpose if broken else ""  # g on Measure goes on with it
+    verifying = "2 g" if ended == "verify" else "6 v"
+    measuring = "2 g" if ended == "measure" else "2 n"
     return [
         JobStep(
             "connect",
-            "open a site and connect (c), or start a mock, which connects by itself",
+            "open a site and connect (c), or start a mock",
             "1 c" if desk.site is not None else "1 o or m",
             desk.connected,
         ),
-        JobStep("found", "verify before anything is changed", "6 v", "found" in done, True),
-        JobStep("measure", "measure poses", "2 n", bool(study.runs), True),
+        JobStep("found", "verify before anything is changed", verifying, "found" in done, True),
+        JobStep("measure", "measure poses", measuring, bool(study.runs), True),
         JobStep("fit", "fit the run", "3 f", fitted),
         JobStep("discover", "ask what the model misses, and add it", asking, adequate),
         JobStep(
             "apply", "compare with the controller, and write", "5 c a", "applied" in done, True
         ),
-        JobStep("left", "verify again", "6 v", "left" in done, True),
+        JobStep("left", "verify again", verifying, "left" in done, True),
         JobStep("record", "write the calibration record", "6 p", "record" in done),
     ]
 
@@ -58,12 +62,24 @@ def next_of(steps: list[JobStep]) -> JobStep | None:
     return connect if coming is not None and coming.live and not connect.done else coming
 
 
+def in_work(desk: "Desk") -> str:
+    """The word of the step that the running job is; empty where none runs, or it is none."""
+    if not desk.busy or desk.automatic.running is not None:
+        return ""
+    if desk.corrections.running is not None:
+        return "apply"
+    purpose = desk.picture.purpose if desk.session is not None else ""
+    verified = "left" if "applied" in desk.course.done else "found"
+    return {"measure": "measure", "verify": verified}.get(purpose, "")
+
+
 class NextLine(Static):
     """One line on every screen: what comes next, with its keys, and ticks at what is done."""
 
     def show(self, desk: "Desk") -> None:
         """Draw the steps; while a job runs that is said in place of the next one."""
         steps = job_steps(desk)
+        working = in_work(desk)
         coming = None if desk.busy else next_of(steps)
         if desk.busy:
             said = "a job runs: 2 "
@@ -72,7 +88,7 @@ class NextLine(Static):
         parts: list[Content | tuple[str, str] | str] = [(said, "bold"), " "]
         for step in steps:
             sign, style = ("✓", "") if step.done else ("·", "dim")
-            if step is coming:
+            if step is coming or step.word == working:
                 sign, style = "▶", "bold"
             parts += [" ", (f"{sign}{step.word}", style)]
         self.update(Content.assemble(*parts))

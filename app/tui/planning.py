@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 from textual import on
 from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
 from textual.containers import Horizontal
 from textual.content import Content
 from textual.widgets import Button, Checkbox, Input, RadioButton, RadioSet, Static
@@ -22,6 +23,8 @@ from app.jobs.read_there import drawn_for, readings_of
 from app.session.plan import Plan
 from app.session.plans import Order, PlanOptions, measure_plan
 from app.tui.automatic import FlightWish
+from app.tui.browsing import Browse
+from app.tui.choosing import IS_POSES
 from app.tui.dialogs import Dialog
 from calib.poses import design_poses
 from calib.poses.margin import stroke_margin
@@ -83,9 +86,15 @@ class Check(Checkbox):
         return "X" if self.value else " "
 
 
+def is_poses_file(path: Path) -> bool:
+    """Whether it is a poses file of the program, or a table that may hold poses."""
+    return path.suffix == ".csv" or IS_POSES(path)
+
+
 class NewRun(Dialog[RunWish]):
     """The form for a new run."""
 
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("ctrl+o", "look", "Poses file", priority=True)]
     escape_says: ClassVar[str] = "tab: next field   enter: start   esc: close"
 
     def __init__(self, site: Site) -> None:
@@ -117,9 +126,21 @@ class NewRun(Dialog[RunWish]):
         yield Check("wait until temperatures are steady", True, id="warm-up", compact=True)
         with Horizontal(classes="dialog-buttons"):
             yield Button("Start", variant="success", id="start")
+            yield Button("Poses file  ctrl+o", id="look")
+
+    @on(Button.Pressed, "#look")
+    def action_look(self) -> None:
+        """Look for a poses file in the folders; it takes the place of the number."""
+
+        def taken(path: str | None) -> None:
+            if path:
+                self.query_one("#poses", Input).value = path
+
+        text = "Open folders down to the poses file (.toml or .csv), and take it"
+        self.app.push_screen(Browse("Poses file", text, Path(), is_poses_file), taken)
 
     @on(Input.Submitted)
-    @on(Button.Pressed)
+    @on(Button.Pressed, "#start")
     def _start(self) -> None:
         poses = self.query_one("#poses", Input).value.strip()
         if not poses:

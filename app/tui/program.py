@@ -29,7 +29,7 @@ from app.tui.measure import MeasureFace
 from app.tui.painting import Painted
 from app.tui.preferences import keep_theme, kept_theme
 from app.tui.residuals import ResidualsFace
-from app.tui.theme import BENCH
+from app.tui.theme import BENCH, with_inks
 from app.tui.verify import VerifyFace
 from app.tui.watch import WatchFace
 from app.tui.widgets.frame import STOP_KEY
@@ -88,6 +88,11 @@ class Workbench(Painted[None]):
         self._asked: PromptNeeded | None = None
         self._rung: PromptNeeded | None = None
         self._came_from = self.DEFAULT_MODE
+
+    def get_css_variables(self) -> dict[str, str]:
+        """Give the theme's colours, and their inks for text."""
+        self.theme_variables = with_inks(super().get_css_variables())
+        return self.theme_variables
 
     def on_mount(self) -> None:
         """Open the site that the command line named, and begin to watch."""

@@ -24,14 +24,14 @@ def start_text(steps: list[JobStep], recent: list[SessionFacts]) -> Content:
     """What is to be done, in its order, with keys; then the last sessions."""
     lines = [
         Content.from_markup(
-            "No site is open.  [bold $accent]o[/] opens a site file,  "
-            "[bold $accent]m[/] starts a mock machine."
+            "No site is open.  [bold $ink-accent]o[/] opens a site file,  "
+            "[bold $ink-accent]m[/] starts a mock machine."
         )
     ]
     if MYSTERY.is_dir():
         lines.append(
             Content.from_markup(
-                "[bold $accent]t[/] tries the mystery run: what is wrong with this hexapod?"
+                "[bold $ink-accent]t[/] tries the mystery run: what is wrong with this hexapod?"
             )
         )
     lines.append(Content(""))
@@ -48,8 +48,8 @@ def start_text(steps: list[JobStep], recent: list[SessionFacts]) -> Content:
         lines.append(Content(""))
         lines.append(
             Content.from_markup(
-                "[dim]last sessions;[/]  [bold $accent]a[/] watches one that another terminal "
-                "runs,  [bold $accent]h[/] looks back"
+                "[dim]last sessions;[/]  [bold $ink-accent]a[/] watches one that another terminal "
+                "runs,  [bold $ink-accent]h[/] looks back"
             )
         )
         lines += [Content(session_words(facts)) for facts in recent]

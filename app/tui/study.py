@@ -37,14 +37,33 @@ class Study:
         self.search: Search | None = None
         self.offers: tuple[Path, ...] = ()
         """Effect files of the site: candidates beside the catalogue."""
+        self.model: Path | None = None
+        """The model file that the effects were taken from, for those that are its own."""
 
     def choose(self, runs: tuple[str, ...]) -> None:
         """Study other runs; what was found in the last ones is put aside."""
-        if runs != self.runs:
+        if self.runs and runs != self.runs:
             self.answer = self.search = None
             self.effects = self.masked = ()
+            self.model = None
         self.runs = runs
         self._picture.revision += 1
+
+    async def begin_with(self, model: Path) -> None:
+        """Take the effects of a model file; the next fit and question begin with them.
+
+        Raises
+        ------
+        BadInput
+            If it cannot be read.
+        """
+        from app.files.fits import read_fit
+
+        saved = await asyncio.to_thread(read_fit, model)
+        self.answer = self.search = None
+        self.model, self.effects = model, saved.effects
+        names = ", ".join(saved.effects) or "none"
+        self._picture.write(f"effects of {model}: {names}", "good")
 
     def mask(self, line: str) -> None:
         """Leave a reading out of the next fit, or take it back; it stays in its file.
@@ -82,12 +101,12 @@ class Study:
     async def identify(self) -> None:
         """Fit the chosen runs, or the latest; raises :class:`BadInput`."""
         runs = self._chosen()
-        effects, masked = self.effects, self.masked
+        effects, masked, offers, model = self.effects, self.masked, self.offers, self.model
 
         def work() -> "FitAnswer":
-            from app.tui.analysis import identify
+            from app.tui.analysis import OwnEffects, identify
 
-            return identify(runs, effects, masked)
+            return identify(runs, effects, masked, OwnEffects(offers, model))
 
         self._take(await self._think(work))
 
@@ -103,15 +122,14 @@ class Study:
     async def diagnose(self) -> None:
         """Ask what the model of the chosen runs misses, with the effects that are in it."""
         runs = self._chosen()
-        effects, offers, masked = self.effects, self.offers, self.masked
-
+        effects, masked, offers, model = self.effects, self.masked, self.offers, self.model
         before = self.search.stairs if self.search is not None else []
 
         def work() -> "tuple[Search, FitAnswer]":
-            from app.tui.analysis import answer_of
+            from app.tui.analysis import OwnEffects, answer_of
             from app.tui.discovering import Search
 
-            found = Search.of(runs, effects, offers, masked)
+            found = Search.of(runs, effects, OwnEffects(offers, model), masked)
             if before:  # asked again: the way so far stands
                 found.stairs[:] = [*before, *(s for s in found.stairs[1:] if s not in before)]
             return found, answer_of(runs, found.present.run.fit)

@@ -18,15 +18,16 @@ from app.tui.face import Face
 from app.tui.picture import Picture
 from app.tui.shelf import finished_verifications
 from app.tui.starting import session_words
-from app.tui.verifying import Verified
+from app.tui.verifying import Verified, one_in_eight
 from app.tui.widgets.plots import LogPairPlot
 from app.tui.widgets.tables import fill
 from app.verification import PAPER
 from calib.arrays import Array
 from calib.pose_error import Summary
+from calib.poses.verification import unit_grid
 
 RECORD_ENDINGS = (".html", ".pdf")
-ALL, QUICK = "all poses", "quick: one in eight"
+ALL, QUICK = "all poses", "quick"
 
 
 class VerifyFace(Face):
@@ -128,9 +129,14 @@ class VerifyFace(Face):
                 quick = answer == QUICK
                 self.act(lambda: self.desk.verify(quick), busy="choosing verification poses ...")
 
+        smrs = site.hands.smrs
+        nests = len(site.platform_nests)
+        carried = f", one SMR carried into {nests} nests" if smrs < nests else ""
+        labels = list(unit_grid(site.machine)[0])
+        few = len(one_in_eight(labels))
         text = (
-            f"The machine will visit a grid of poses with {site.hands.smrs} "
-            f"SMR{'s' if site.hands.smrs > 1 else ''}. Progress is on the Measure screen."
+            f"The machine will visit a grid of {len(labels)} poses, quick: {few} of them{carried}. "
+            "Nothing is written to it. Progress is on the Measure screen (2)."
         )
         self.app.push_screen(Choose("Verify", text, (ALL, QUICK)), chosen)
 
@@ -160,7 +166,12 @@ class VerifyFace(Face):
 
         def write(out: Path) -> None:
             outs = [out.with_suffix(ending) for ending in RECORD_ENDINGS]
-            self.act(lambda: self.desk.write_record(outs), busy="writing the record ...")
+
+            async def written() -> None:
+                await self.desk.write_record(outs)
+                self.notify(f"{' and '.join(map(str, outs))}", title="Calibration record")
+
+            self.act(written, busy="writing the record ...")
 
         text = "File for the calibration record; it is written as .html and .pdf"
         ask_for_file(self, "Calibration record", text, "record", write, RECORD_ENDINGS)
@@ -180,10 +191,13 @@ def aligned(
     for _, one in sorted(shown, key=lambda each: -len(each[1].found.labels)):
         for label in one.found.labels:
             places.setdefault(label, float(len(places) + 1))
+    alone = len(shown) == 1
     return {
-        name: (np.array([places[label] for label in one.found.labels]), one.errors[which])
+        "measured" if alone else name: (
+            np.array([places[label] for label in one.found.labels]), one.errors[which],
+        )
         for name, one in shown
-    }
+    }  # fmt: skip
 
 
 def running_text(picture: Picture) -> str:
@@ -201,13 +215,13 @@ def summary_text(before: Verified | None, after: Verified | None, running: str =
     """Peaks and standard deviations, before and after, with what they can be compared to."""
     if before is None and after is None:
         if running:
-            return Content.assemble(("▶ ", "$accent"), running)
-        return Content.from_markup("[bold $accent]v[/] measures where the machine goes.")
+            return Content.assemble(("▶ ", "$ink-accent"), running)
+        return Content.from_markup("[bold $ink-accent]v[/] measures where the machine goes.")
     lines = [
-        Content.assemble(("▶ ", "$accent"), running)
+        Content.assemble(("▶ ", "$ink-accent"), running)
         if running
         else Content.from_markup(
-            "[dim]                      peak µm   std µm     peak °     std °[/]"
+            "[dim]                      peak µm   std µm  peak mdeg  std mdeg[/]"
         )
     ]
     for when, verified in (("before", before), ("after", after)):
@@ -228,12 +242,12 @@ def summary_text(before: Verified | None, after: Verified | None, running: str =
 
 
 def _row(name: str, peak_um: float, peak_deg: float) -> str:
-    return f"{name:<20}{peak_um:9.1f}{'':9}{peak_deg:11.4f}"
+    return f"{name:<20}{peak_um:9.1f}{'':9}{1e3 * peak_deg:11.1f}"
 
 
 def _line(name: str, found: Summary, *, bold: bool = False) -> Content:
     text = (
         f"{name:<20}{found.position_peak_um:9.1f}{found.position_std_um:9.1f}"
-        f"{found.orientation_peak_deg:11.4f}{found.orientation_std_deg:10.4f}"
+        f"{1e3 * found.orientation_peak_deg:11.1f}{1e3 * found.orientation_std_deg:10.1f}"
     )
     return Content.assemble((text, "bold" if bold else ""))

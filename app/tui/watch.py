@@ -107,7 +107,7 @@ class WatchFace(Face):
 def state_text(watched: Watching | None) -> Content:
     """Which session, how far, what it does."""
     if watched is None:
-        return Content.from_markup("[bold $accent]o[/] chooses a session of this folder")
+        return Content.from_markup("[bold $ink-accent]o[/] chooses a session of this folder")
     facts = watched.facts
     machine = f"{facts.machine} {facts.serial}".strip()
     title = f" · {facts.title}" if facts.title else ""

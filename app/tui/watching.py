@@ -7,7 +7,8 @@ from pathlib import Path
 from app.session.facts import SessionFacts
 from app.session.happenings import Following, Happening
 from app.show.clocks import happening_line
-from app.tui.picture import Level, Picture
+from app.tui.parts import Level
+from app.tui.picture import Picture
 
 SILENT_S = 30.0
 """After so long without an entry it is said that nothing happens."""

@@ -4,9 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from mocks.arguments import parser
 from mocks.hands import address_of
 from mocks.hidden.table import Hidden
 from mocks.physics.truth import machine_file, read_parameters
+from mocks.station import build
 
 HEXAPOD = machine_file("hexapod")
 
@@ -61,3 +63,15 @@ def test_a_site_names_the_socket_of_its_mock(tmp_path: Path) -> None:
     assert address_of(str(site)) == "127.0.0.1:9"
     with pytest.raises(ValueError, match="no mock's control socket"):
         address_of(str(written(tmp_path, "other.toml", "hands = 3\n")))
+
+
+def test_hidden_effects_of_the_command_line_stand_over_those_of_the_file(tmp_path: Path) -> None:
+    path = written(tmp_path, "h.toml", '[hidden]\n"backlash.leg3" = 0.02\n"backlash.leg1" = 0.01\n')
+    told = ["hexapod", "--hidden", str(path), "--effect", "backlash.leg3=0.03"]
+    station = build(parser().parse_args([*told, "--effect", "screw-twist.L=2"]))
+    wanted = {"backlash.leg1": 0.01, "backlash.leg3": 0.03, "screw-twist.L": 2.0}
+    assert station.world.plan.hidden.values == wanted
+    for wrong in ("backlash.leg3", "backlash.leg3=far"):
+        with pytest.raises(SystemExit) as ended:
+            parser().parse_args([*told[:1], "--effect", wrong])
+        assert ended.value.code == 2

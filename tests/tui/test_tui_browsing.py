@@ -6,7 +6,8 @@ import pytest
 from textual.widgets import DirectoryTree
 
 from app.tui.browsing import Browse
-from app.tui.dialogs import Pick, is_site_file, site_candidates
+from app.tui.choosing import IS_MODEL, IS_POSES, IS_SITE, here
+from app.tui.dialogs import Pick
 from app.tui.program import Workbench
 
 
@@ -57,10 +58,11 @@ async def test_the_folder_above_is_a_key_away(
         assert "STOP ctrl+x" in str(bench.screen.query_one(".dialog-stop").render())
 
 
-def test_only_what_says_so_is_a_site(tmp_path: Path) -> None:
-    (tmp_path / "site.toml").write_text('format = "pkm-site/1"\n')
-    (tmp_path / "model.toml").write_text('format = "pkm-model/1"\n')
+def test_only_what_says_so_is_taken(tmp_path: Path) -> None:
+    known = {"site": IS_SITE, "model": IS_MODEL, "poses": IS_POSES}
+    for form in known:
+        (tmp_path / f"{form}.toml").write_text(f'format = "pkm-{form}/1"\n')
     (tmp_path / "folder.toml").mkdir()
-    assert [path for path, _ in site_candidates(tmp_path)] == [str(tmp_path / "site.toml")]
-    assert not is_site_file(tmp_path / "none.toml")
-    assert not is_site_file(tmp_path / "folder.toml")
+    for form, wanted in known.items():
+        assert [path for path, _ in here(tmp_path, wanted)] == [str(tmp_path / f"{form}.toml")]
+        assert not wanted(tmp_path / "none.toml")

@@ -5,7 +5,8 @@ import pytest
 from app.session import events as ev
 from app.tui.devices import gauge_text
 from app.tui.measure import now_text
-from app.tui.picture import Picture, StepLine
+from app.tui.parts import StepLine
+from app.tui.picture import Picture
 from drivers.interface import GaugeState, Identity
 
 TAKEN = ev.NumberTaken(1, "p01", "p1", "b2", (1.0,), 300.0123, 300.0, 0.002, "mm", 5.0)

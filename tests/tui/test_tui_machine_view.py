@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 
 from app.files.site import load_site
 from app.show.machine_sketch import ring
-from app.tui.machine_view import MachineView, sketch
+from app.tui.machine_view import MachineView, Seen, enlarged, over, sketch
 from app.tui.program import Workbench
 
 HOME = (0.0, 0.0, 220.0, 0.0, 0.0, 0.0)
@@ -25,10 +25,12 @@ def test_the_platform_moves_in_the_drawing_and_the_base_stays(tmp_path: Path) ->
     (tmp_path / "site.toml").write_text(stream.SITE, encoding="utf-8")
     site = load_site(tmp_path / "site.toml")
     frame = site.tracker.frame
-    heads, home = sketch(site, HOME, "", frame, 66, 15)
+    heads, home, _, _ = sketch(site, Seen(HOME, "", frame, {}), 66, 15)
     assert heads.split() == ["front", "(x,", "z)", "from", "above", "(x,", "y)"]
-    _, away = sketch(site, AWAY, "", frame, 66, 15)
-    _, seen = sketch(site, AWAY, "3", frame, 66, 15)
+    _, away, none, times = sketch(site, Seen(AWAY, "", frame, {}), 66, 15)
+    assert not dots(none).any()
+    assert times == 0.0
+    _, seen, _, _ = sketch(site, Seen(AWAY, "3", frame, {}), 66, 15)
     assert {len(line) for line in home.splitlines()} == {66}
     base = slice(-4, None)
     still = dots(home)[base, :32] == dots(away)[base, :32]
@@ -37,6 +39,36 @@ def test_the_platform_moves_in_the_drawing_and_the_base_stays(tmp_path: Path) ->
     beam = dots(seen) & ~dots(away)
     assert beam.sum() > 5  # the beam is there
     assert not (dots(away) & ~dots(seen)).any()  # and hides nothing
+
+
+def test_the_last_error_of_each_nest_is_an_arrow_over_the_machine(tmp_path: Path) -> None:
+    (tmp_path / "site.toml").write_text(stream.SITE, encoding="utf-8")
+    site = load_site(tmp_path / "site.toml")
+
+    def drawn(off: float) -> tuple[str, str, float]:
+        seen = Seen(AWAY, "", None, {"3": (off, 0.0, 0.0)})
+        _, drawing, arrows, times = sketch(site, seen, 66, 15)
+        return drawing, arrows, times
+
+    drawing, right, times = drawn(0.5)
+    _, left, back = drawn(-0.5)
+    assert times == back
+    assert 5 <= dots(right).sum() <= 20  # two views of one arrow
+    starts = dots(right) & dots(left)
+    for one, way in ((right, 1), (left, -1)):  # each goes its own way from the nest
+        columns = np.nonzero((dots(one) & ~starts)[:, :33])[1]
+        assert (way * (columns - np.nonzero(starts[:, :33])[1].mean()) > 0).all()
+    text = over(drawing, right)
+    assert len(text.plain) == len(drawing)
+    assert sum(span.end - span.start for span in text.spans) == dots(right).sum()
+
+
+@pytest.mark.parametrize("size", [3e-6, 0.0007, 0.04, 12.0])
+def test_errors_are_enlarged_by_a_round_number_to_a_length_that_is_seen(size: float) -> None:
+    off = np.array([[size, 0.0], [0.0, 0.3 * size], [0.0, 0.0]])
+    times = enlarged(off, 60.0)
+    assert 24.0 <= times * size <= 60.0 * (1 + 1e-9)
+    assert f"{times:.3e}"[:5] in ("1.000", "2.000", "5.000")
 
 
 @pytest.mark.parametrize("seed", range(5))

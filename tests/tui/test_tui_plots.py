@@ -1,5 +1,7 @@
 """What is left out of a plot, and what never is."""
 
+import re
+
 import numpy as np
 import pytest
 from textual.app import App, ComposeResult
@@ -7,7 +9,7 @@ from textual_hires_canvas.canvas import Canvas
 
 from app.show.spans import duration
 from app.tui.theme import SERIES
-from app.tui.widgets.plots import PairPlot, few_ticks, thin
+from app.tui.widgets.plots import LogPairPlot, PairPlot, QuietPlot, few_ticks, thin
 
 
 def test_thinning_keeps_the_outlier() -> None:
@@ -53,6 +55,40 @@ async def test_every_point_of_a_series_has_its_mark(count: int) -> None:
         lines = [canvas.render_line(row) for row in range(canvas.size.height)]
         text = "".join(segment.text for line in lines for segment in line)
         assert text.count(marker) == count
+
+
+class Logarithmic(App[None]):
+    """One plot over a logarithmic axis."""
+
+    def compose(self) -> ComposeResult:
+        yield LogPairPlot("errors", id="plot")
+
+
+def drawn(plot: QuietPlot) -> str:
+    """Everything that a plot shows, labels and marks."""
+    return "\n".join(
+        "".join(segment.text for segment in canvas.render_line(row))
+        for canvas in plot.query(Canvas)
+        for row in range(canvas.size.height)
+    )
+
+
+async def test_a_logarithmic_axis_is_labelled_with_the_numbers_themselves() -> None:
+    async with Logarithmic().run_test(size=(120, 30)) as pilot:
+        plot = pilot.app.query_one(LogPairPlot)
+        plot.show({"all": (np.arange(3.0), np.array([3.0, 40.0, 700.0]))}, 1)
+        await pilot.pause(0.2)
+        labels = re.findall(r"^ *([0-9.]+) *$", drawn(plot), re.MULTILINE)
+        assert {"10", "100"} <= set(labels)
+
+
+async def test_a_plot_of_nothing_shows_nothing() -> None:
+    async with Marks().run_test(size=(120, 30)) as pilot:
+        plot = pilot.app.query_one(PairPlot)
+        for count, shown in ((0, False), (3, True), (0, False)):
+            plot.show({"all": (np.arange(float(count)), np.ones(count))}, (count, shown))
+            await pilot.pause(0.2)
+            assert bool(drawn(plot).strip()) is shown
 
 
 def test_time_spans_in_words() -> None:

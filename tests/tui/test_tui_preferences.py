@@ -9,7 +9,17 @@ from textual.widgets import Input
 from app.tui.dialogs import Choose, Enter
 from app.tui.preferences import keep_theme, kept_theme
 from app.tui.program import Workbench
-from app.tui.theme import LEVELS, SERIES, STYLES, tinted
+from app.tui.theme import (
+    CONTRAST,
+    FIXED,
+    GROUNDS,
+    INKED,
+    LEVELS,
+    SERIES,
+    STYLES,
+    contrast,
+    tinted,
+)
 from app.tui.widgets.plots import MissPlot
 
 
@@ -37,8 +47,9 @@ async def test_a_theme_is_kept_and_plots_follow_it(tmp_path: Path, own_state: Pa
         assert last.theme == "bench"
 
 
-async def test_every_role_has_a_colour_in_every_theme(tmp_path: Path) -> None:
+async def test_every_role_can_be_read_in_every_theme(tmp_path: Path) -> None:
     from rich.style import Style
+    from textual.color import Color
 
     bench = Workbench(root=tmp_path)
     async with bench.run_test(size=(80, 24)) as pilot:
@@ -47,6 +58,13 @@ async def test_every_role_has_a_colour_in_every_theme(tmp_path: Path) -> None:
             bench.theme = name
             for style in styles:
                 assert Style.parse(tinted(bench, style)).color is not None
+            variables = bench.theme_variables
+            grounds = [Color.parse(variables[ground]) for ground in GROUNDS]
+            for role in (*INKED, *FIXED):
+                ink = Color.parse(variables[f"ink-{role}"])
+                for ground in grounds:
+                    if ink.ansi is None and ground.ansi is None:
+                        assert contrast(ink, ground) >= CONTRAST, (name, role)
         await pilot.pause()
 
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+import tomllib
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from app.session import kinds
 from app.session.folder import make_folder
 from app.session.journal import IDENTITIES, Journal
 from app.session.known import Snapshot
-from app.session.plan import Plan
+from app.session.plan import Plan, Step
 from app.session.plans import PlanOptions, measure_plan
 from app.session.session import Session
 from app.tui.analysis import FitAnswer
@@ -26,6 +27,7 @@ from app.tui.reading_lines import ReadingLine
 from app.tui.verifying import Verified
 from app.verification import Verification
 from app.writeback.proposal import Change, Proposal
+from calib.frames import nest_in_base
 from drivers.interface import (
     ActuatorState,
     Alarm,
@@ -54,6 +56,12 @@ b1 = [260.0, 0.0, -30.0]
 b2 = [0.0, 260.0, -30.0]
 b3 = [-260.0, 0.0, -30.0]
 """
+
+NESTS = {
+    name: tuple(place)
+    for kind in tomllib.loads(SITE)["nests"].values()
+    for name, place in kind.items()
+}
 
 CONTROLLER = Identity("canopen", "", "pkmcal hexapod controller", "1001", "1.0.0")
 TRACKER = Identity("emscon", "", "AT901-LR", "390793", "3.6")
@@ -118,12 +126,13 @@ def measured(plan: Plan, until: int) -> list[ev.Event]:
             told.append(ev.PoseCommanded(step.args["pose"], pose, q, time_s))
         if step.kind in (kinds.READ, kinds.REFERENCE):
             number += 1
-            miss = 0.6 + 0.2 * math.sin(index) if step.kind is kinds.READ else 0.008
+            off = 0.6 + 0.2 * math.sin(index) if step.kind is kinds.READ else 0.008
+            seen, there, miss = reading_of(plan, step, off)
             told += [ev.LiveScatter(0.03 / (1 + k), 0.02, (0.0, 0.0, 0.0), k > 1) for k in range(5)]
             told.append(
                 ev.ReadingTaken(
                     number, str(step.args.get("pose", "")), step.args["nest"], (230.0,) * 6,
-                    (0.0, 0.0, 0.0), (0.0, 0.0, miss), miss, 0.006, time_s,
+                    seen, there, miss, 0.006, time_s,
                 )
             )  # fmt: skip
         if step.kind is kinds.DRIFT:
@@ -132,6 +141,14 @@ def measured(plan: Plan, until: int) -> list[ev.Event]:
         told.append(ev.StepDone(step.id, index, f"{step.says}: done", time_s + 5.0))
         told.append(ev.Progress(index + 1, len(plan.steps), 600.0 - index))
     return told
+
+
+def reading_of(plan: Plan, step: Step, off: float) -> tuple[ev.Vector, ev.Vector, float]:
+    """Where a nest is seen, where it is predicted, and how far apart these are: along x."""
+    nest = step.args["nest"]
+    pose = plan.poses.get(step.args.get("pose", ""), (0.0,) * 6)
+    x, y, z = map(float, nest_in_base(pose, NESTS[nest]))
+    return (x + off, y, z), (x, y, z), off
 
 
 async def put_up(bench: Workbench, folder: Path, until: int = 30) -> Session:

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from textual_hires_canvas import Canvas
 from textual_plot import HiResMode, PlotWidget
 from textual_plot.axis_formatter import NumericAxisFormatter
 
-from app.tui.picture import Point
+from app.tui.parts import Point
 from app.tui.theme import BASE, SERIES, tinted
 
 MOST = 400
@@ -44,7 +45,23 @@ class QuietPlot(PlotWidget):
         self.margin_left = 6
         self.margin_bottom = 1
         self.margin_top = 0
-        self.set_y_formatter(Spaced(self))
+        self.set_y_formatter(self.upright())
+
+    def upright(self) -> NumericAxisFormatter:
+        """What labels the upright axis.
+
+        Not set by an ``on_mount`` of a subclass: Textual calls that of this class after it.
+        """
+        return Spaced(self)
+
+    def _render_plot(self) -> None:
+        """Draw nothing while there is nothing: an axis without marks would pass for a result."""
+        if self._datasets:
+            super()._render_plot()
+            return
+        for canvas in self.query(Canvas):
+            if canvas.size:
+                canvas.reset()
 
     def changed(self, key: object) -> bool:
         """Whether what is to be drawn, or the theme, differs from what is drawn."""
@@ -68,8 +85,6 @@ class MissPlot(QuietPlot):
         self.clear()
         self.border_subtitle = ""
         if not points:
-            self.set_xlimits(0, 10)
-            self.set_ylimits(0, 1)
             return
         top = max(point.miss_mm for point in points) * 1000.0
         self.set_xlimits(0, max(10, points[-1].number + 1))
@@ -205,10 +220,9 @@ class Decades(NumericAxisFormatter):
 class LogPairPlot(PairPlot):
     """The same over a logarithmic axis: a machine before and after differs by decades."""
 
-    def on_mount(self) -> None:
-        """Label the decades."""
-        super().on_mount()
-        self.set_y_formatter(Decades())
+    def upright(self) -> NumericAxisFormatter:
+        """Labels at decades."""
+        return Decades()
 
     def show(self, series: Mapping[str, tuple[Array, Array]], key: object) -> None:
         """Draw named series of x and y; zeros stand at the bottom."""

@@ -8,7 +8,7 @@ from textual.geometry import Size
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
-from app.tui.picture import StepLine
+from app.tui.parts import StepLine
 from app.tui.theme import MARKS, STYLES, tinted
 
 
