@@ -202,7 +202,7 @@ async def test_palette_runs_an_action_of_another_screen(bench: Workbench) -> Non
         await pilot.press("ctrl+p")
         await pilot.pause(0.3)
         assert isinstance(bench.screen, CommandPalette)
-        await pilot.press(*"fit: choose")
+        await pilot.press(*"fit: run")
         await pilot.pause(0.8)
         await pilot.press("enter")
         await pilot.pause(0.2)
