@@ -20,6 +20,7 @@ from calib.discover.agreement import (
     runs_at_odds,
     successive_alike,
 )
+from calib.discover.cables import slack_cables
 from calib.identify import Fit, fit_report
 from calib.identify.beyond import beyond_words
 from calib.identify.staged import fit_effects
@@ -197,7 +198,8 @@ def fit(
     found = fit_effects(rows, effects, masked_rows(rows, lines_of(mask)))
     remember_fit(found, names)
     words = (
-        runs_at_odds(found), successive_alike(found), more_than_noise(found), *beyond_words(found),
+        runs_at_odds(found), successive_alike(found), more_than_noise(found), slack_cables(found),
+        *beyond_words(found),
     )  # fmt: skip
     log_p = log_chance(found)
     said = {

@@ -59,6 +59,8 @@ def _traits(machine: Machine, limb: Limb) -> list[str]:
         told.append("platform joint at an azimuth")
     if traits.yields is not None:
         told.append(f"a spring of {limb.elements[traits.yields].compliance:g} mm/N")
+    if traits.pulls is not None:
+        told.append(f"a rope that only pulls, {limb.elements[traits.pulls].compliance:g} mm/N")
     return told
 
 

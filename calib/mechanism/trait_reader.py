@@ -27,6 +27,7 @@ from calib.toml_table import TomlTable
 
 KEYS = (
     "grows", "base_joint", "platform_joint", "screw", "parallelogram", "platform_azimuth", "yields",
+    "pulls",
 )  # fmt: skip
 MASSES = "masses"
 
@@ -76,7 +77,8 @@ class TraitReader:
                 for name in self._listed("platform_azimuth", table)
                 for part in self._parts("platform_azimuth", name, chain, "fixed turn")
             ),
-            yields=self._spring(table, chain),
+            yields=self._spring("yields", table, chain),
+            pulls=self._spring("pulls", table, chain),
             masses=tuple(self._masses(chain)),
         )
 
@@ -227,15 +229,15 @@ class TraitReader:
             for part in self._parts("parallelogram", name, chain, "length")
         )
 
-    def _spring(self, table: Mapping[str, Any], chain: int) -> int | None:
+    def _spring(self, key: str, table: Mapping[str, Any], chain: int) -> int | None:
         found = [
             part.element
-            for name in self._listed("yields", table)
-            for part in self._parts("yields", name, chain, "spring")
+            for name in self._listed(key, table)
+            for part in self._parts(key, name, chain, "spring")
         ]
         if len(found) > 1:
             raise self._fail(
-                "yields",
+                key,
                 f'limb "{self.limb}" names {len(found)} springs in one chain',
                 "Name the one along the rod; the others yield in the file's proportion to it.",
             )

@@ -52,6 +52,8 @@ class Traits:
         Turn of the platform joint's frame about the platform's z axis.
     yields : int or None
         The compliant element that is a spring under the weight of the platform.
+    pulls : int or None
+        The compliant element of a rope: it carries tension alone.
     masses : tuple of LinkMass
         Links of a chain whose joints are all driven, as far as they have a weight.
     """
@@ -63,6 +65,7 @@ class Traits:
     sides: tuple[Part, ...] = ()
     platform_azimuth: tuple[Part, ...] = ()
     yields: int | None = None
+    pulls: int | None = None
     masses: tuple[LinkMass, ...] = ()
 
 

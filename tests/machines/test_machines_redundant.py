@@ -41,8 +41,8 @@ a5 = { unit = "mm", tolerance = 0.5, nominal = 400.0 }
 """
 
 
-def eight() -> str:
-    """Eight telescopic legs from the corners of a room to the corners of a box."""
+def eight(*, cables: bool = False) -> str:
+    """Eight telescopic legs from the corners of a room to the corners of a box; or eight ropes."""
     boxes = [f'{name} = ["-5 deg", "5 deg"]' for name in ("rx", "ry", "rz")]
     text = ['format = "pkm-machine/1"', 'name = "eight"', "[home]", "pose = { z = 400.0 }"]
     text += ["[workspace]", "x = [-60.0, 60.0]", "y = [-60.0, 60.0]", "z = [340.0, 460.0]"]
@@ -51,15 +51,19 @@ def eight() -> str:
     for k, (a, b, c) in enumerate(np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T, 1):
         base = np.array([500.0 * a, 400.0 * b, 450.0 * (c + 1)])
         corner = np.array([60.0 * b, -70.0 * a, -40.0 * c])
+        if cables:  # these can hold one another taut
+            corner = np.array([-60.0 * a, 70.0 * b, 40.0 * c])
         way = np.array([0.0, 0.0, 400.0]) + corner - base
         length = float(np.linalg.norm(way))
         x, y, z = way / length
         first, second = np.arctan2(-y, z), np.arcsin(x)
+        spring = "rope=ctz:1e-4" if cables else "ctz:1e-5"
         legs.append(
             f'[limbs.leg{k}]\nchain = "tx:{base[0]} ty:{base[1]} tz:{base[2]} Rx({first:.6f}) '
-            f"Ry({second:.6f}) Tz:q{k}+L0 ctz:1e-5 Ry({-second:.6f}) Rx({-first:.6f}) Rz "
+            f"Ry({second:.6f}) Tz:q{k}+L0 {spring} Ry({-second:.6f}) Rx({-first:.6f}) Rz "
             f'tx:{-corner[0]} ty:{-corner[1]} tz:{-corner[2]}"\n'
-            f'[limbs.leg{k}.parameters]\nL0 = {{ unit = "mm", tolerance = 0.5, nominal = 0.0 }}'
+            + (f'[limbs.leg{k}.traits]\npulls = "rope"\n' if cables else "")
+            + f'[limbs.leg{k}.parameters]\nL0 = {{ unit = "mm", tolerance = 0.5, nominal = 0.0 }}'
         )
         text.append(f'q{k} = {{ unit = "mm", home = {length!r}, limits = [200.0, 1200.0] }}')
     return "\n".join([*text, *legs])
