@@ -141,6 +141,10 @@ def design(
         "seed": seed,
     }
     said = follow_up_report(plan, discriminate, begin, names)
+    if plan.certainty < SUFFICIENT:
+        way = np.concatenate([refit.rows.extension, machine.extension(plan.poses.q)], axis=1)
+        hard = {effect.id: effect.hard_to_see(machine, way) for effect in effects}
+        said["advice"] += "".join(f" {name}: {why}." for name, why in hard.items() if why)
     return FollowUpReport.of(said, _plan=plan, _again=again)
 
 

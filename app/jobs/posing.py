@@ -13,6 +13,7 @@ from app.files.poses import full_poses, render_design
 from app.files.site import Site
 from app.files.site_limits import Limits
 from app.jobs.chosen_runs import File, at_least
+from app.jobs.foreseeing import RESERVED, explored, read_by_tracker
 from app.jobs.read_there import CALIPERS_SIGMA_UM, readings_of
 from app.jobs.record import Record, Report
 from app.jobs.searching import Search, best_of, fresh_poses, search
@@ -68,9 +69,25 @@ class KeptFreeEntry(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
+class SightEntry(Record):
+    """An effect of size 1 (it moves the readings by sqrt(3) sigma): probability to see it.
+
+    ``by_accuracy`` with as many poses chosen for accuracy alone; ``why``: where it is hardly seen,
+    and what the poses lack.
+    """
+
+    effect: str
+    power: float
+    by_accuracy: float
+    why: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class PosesReport(Report):
     """Chosen poses in the order of a short path, and what they will give (``pkm-design/1``).
 
+    ``purpose``: accuracy, or discovery: some of the poses then show what the machine may hide,
+    ``will_see`` tells what, the least first, and ``not_asked`` why effects are not in it.
     ``pairs``: marks between which calipers tell most (``p01:p07``), ``with_pairs``: with them
     measured as well. ``kept_free``: what a machine within tolerance needs at the ends of its
     actuators' ranges.
@@ -83,6 +100,7 @@ class PosesReport(Report):
     tolerances_as_priors: bool
     candidates: int
     seed: int
+    purpose: str = "accuracy"
     predicted: AccuracyEntry
     random_poses: AccuracyEntry
     by_count: tuple[CountEntry, ...]
@@ -90,6 +108,8 @@ class PosesReport(Report):
     pairs: tuple[str, ...] = ()
     with_pairs: AccuracyEntry | None = None
     kept_free: tuple[KeptFreeEntry, ...]
+    will_see: tuple[SightEntry, ...] = ()
+    not_asked: Mapping[str, str] = field(default_factory=dict)
     poses: tuple[PoseEntry, ...]
     _design: Design = field(repr=False, compare=False)
     _command: str = field(repr=False, compare=False)
@@ -129,6 +149,7 @@ def choose_poses(
     workers: int | None = None,
     scheduler: str = "",
     watch: Callable[[int, int], None] | None = None,
+    purpose: Literal["accuracy", "discovery"] = "accuracy",
 ) -> PosesReport:
     """Choose measurement poses among reachable ones, and predict what accuracy they give.
 
@@ -170,6 +191,9 @@ def choose_poses(
         Address of a Dask scheduler in place of processes.
     watch : callable, optional
         Told how many of how many searches are done.
+    purpose : "accuracy" or "discovery"
+        All for accuracy; or a third of them to show what the machine may hide, read by a tracker,
+        with a table of what they will see.
 
     Returns
     -------
@@ -193,7 +217,11 @@ def choose_poses(
     here = site_of(site)
     described = machine_for(named, here)
     margin = _margin(described, here, margin_mm)
-    readings = readings_of(described, here, heights, sigma_um, angle_mdeg)
+    to_see = purpose == "discovery"
+    if to_see:
+        at_least(RESERVED, n=n)
+    read = read_by_tracker if to_see else readings_of
+    readings = read(described, here, heights, sigma_um, angle_mdeg)
     asked = Search(described, here, readings, n, seed, criterion, priors, candidates, margin)
     if searches > 1:
         asked = replace(asked, fresh=fresh_poses(described, seed))
@@ -201,6 +229,11 @@ def choose_poses(
         found, seed = best_of(several, workers, scheduler, watch)
     else:
         found = search(asked)
+    sights: dict[str, Any] = {"purpose": purpose, "will_see": [], "not_asked": {}}
+    if to_see:
+        own = search(replace(asked, count=n - n // RESERVED, seed=seed))
+        rng = np.random.default_rng([seed, 1])
+        found, sights = explored(found, own, readings, here, rng, margin)
     marks = None
     if calipers:
         nest = next(iter(here.platform_nests.values())) if here else (0.0, 0.0, 0.0)
@@ -210,6 +243,7 @@ def choose_poses(
         f"pkmcal poses {named or described.name} --n {n} "
         f"--criterion {criterion} --seed {seed} --candidates {candidates}"
     )
+    command += " --for discovery" if to_see else ""
     command += "" if priors else " --no-priors"
     command += f" --site {here.source}" if here else ""
     command += " --heights" if heights else ""
@@ -217,7 +251,7 @@ def choose_poses(
     command += f" --sigma-um {sigma_um:g}" if sigma_um is not None else ""
     command += f" --angle-mdeg {angle_mdeg:g}" if angle_mdeg is not None else ""
     command += f" --margin-mm {margin_mm:g}" if margin_mm is not None else ""
-    said = _said(found, seed, margin, marks)
+    said = _said(found, seed, margin, marks) | sights
     return PosesReport.of(said, _design=found, _command=command)
 
 

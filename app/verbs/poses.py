@@ -32,6 +32,14 @@ from calib.errors import BadInput
     help="I: smallest predicted pose error; D: most information about the parameters.",
 )
 @click.option(
+    "--for",
+    "purpose",
+    type=click.Choice(["accuracy", "discovery"]),
+    default="accuracy",
+    show_default=True,
+    help="discovery: a third of the poses show what the machine may hide; what they will see.",
+)
+@click.option(
     "--priors/--no-priors", default=True, show_default=True, help="Use the tolerances as priors."
 )
 @click.option("--site", "site_file", type=click.Path(path_type=Path), help="Nests of a site file.")
@@ -77,6 +85,7 @@ def command(
     machine_option: str,
     count: int,
     criterion: str,
+    purpose: str,
     priors: bool,
     site_file: Path | None,
     heights: bool,
@@ -97,7 +106,9 @@ def command(
     """Choose measurement poses among reachable ones and predict what accuracy they will give.
 
     The table tells what other numbers of poses would give, so that you can choose. The poses are
-    ordered for a short path; the whole path has been checked against the limits. What a machine
+    ordered for a short path; the whole path has been checked against the limits. With --for
+    discovery the last third of them is chosen, and to be visited in its order, to show effects
+    that the model lacks; a table says which ones it will see, and which not. What a machine
     within its tolerances needs beyond the drawing is kept free of them, so that the same poses can
     be measured again once it has been calibrated.
     """
@@ -129,6 +140,7 @@ def command(
             workers=workers,
             scheduler=scheduler,
             watch=watch,
+            purpose="discovery" if purpose == "discovery" else "accuracy",
         )
     if out:
         chosen.save(out)
@@ -154,7 +166,24 @@ def _text(report: dict[str, Any]) -> str:
         f"({count} random poses: {_number(report['random_poses']['position_rms_um'])} um)\n"
         f"{_marks(report)}"
         f"path: {report['path_in_strokes']:.1f} strokes of the slowest actuator, within all "
-        f"limits\n{_kept_free(report)}\n\n{table}"
+        f"limits\n{_kept_free(report)}\n\n{_sights(report)}{table}"
+    )
+
+
+def _sights(report: dict[str, Any]) -> str:
+    """What the plan will and will not see, the least first."""
+    if not report["will_see"]:
+        return ""
+    rows = [
+        [one["effect"], f"{one['power']:.2f}", f"{one['by_accuracy']:.2f}"]
+        for one in report["will_see"]
+    ]
+    hard = "".join(f"{one['effect']}: {one['why']}\n" for one in report["will_see"] if one["why"])
+    missing = "".join(f"{name}: not asked: {why}\n" for name, why in report["not_asked"].items())
+    return (
+        "An effect of size 1 moves the readings by as much as their noise (RMS). Probability that\n"
+        "it is called for by these poses, and by as many that are chosen for accuracy alone:\n\n"
+        f"{text_table(['effect', 'these', 'accuracy'], rows)}\n\n{hard}{missing}\n"
     )
 
 

@@ -227,6 +227,10 @@ class Effect(ABC):
         """Readings (N,) of whose runs it is known what the effect needs; others are left out."""
         return np.ones(rows.count, dtype=bool)
 
+    def hard_to_see(self, machine: Machine, extension: Array) -> str:
+        """Say why poses with extensions (n, N) show little of it; empty if they do not say so."""
+        return ""
+
     @abstractmethod
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """Name the unknowns."""

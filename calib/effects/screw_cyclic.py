@@ -19,6 +19,8 @@ from calib.unknown import Unknown
 
 OVERSAMPLING = 3.0
 """Trial frequencies for each independent one (1 / range of s)."""
+WHOLE = 1.0
+"""Periods through which poses must take an actuator before its wave is unlike a gain."""
 
 
 class ScrewCyclic(Effect):
@@ -31,6 +33,16 @@ class ScrewCyclic(Effect):
     def axes(self, machine: Machine) -> IntArray:
         """The actuators that may err, by index: all of the first unit, linear before rotary."""
         return next(iter(units_of(machine.axes).values()))
+
+    def hard_to_see(self, machine: Machine, extension: Array) -> str:
+        """No actuator goes through a period: its wave is then much like a gain and an offset."""
+        given, axes = self.given_period(machine), self.axes(machine)
+        periods = [given or machine.axes[index].longest for index in axes]
+        turned = max(np.ptp(extension[axes], axis=1) / np.array(periods))
+        if turned >= WHOLE:
+            return ""
+        period = "a period" if given else "the longest period that is looked for"
+        return f"the poses take no actuator through more than {turned:.2f} of {period}"
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``screw-cyclic.leg1.sin``, ``.cos`` ..., then ``screw-cyclic.period`` if searched."""

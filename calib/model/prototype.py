@@ -54,6 +54,9 @@ def prototype_run(
     sigma_mm: float,
     generator: np.random.Generator,
     cycles: int = 1,
+    *,
+    header: Header | None = None,
+    noise: float = 1.0,
 ) -> Prototype:
     """Measure a prototype with one SMR that is carried from nest to nest.
 
@@ -72,6 +75,10 @@ def prototype_run(
         Draws the tracker's place and the noise.
     cycles : int
         Visits of all poses.
+    header : Header, optional
+        Nests and load of a site; nests as large as the machine if missing.
+    noise : float
+        How large it is, in units of what the readings state.
 
     Raises
     ------
@@ -86,7 +93,11 @@ def prototype_run(
             f"{np.count_nonzero(~real.converged)} of {q.shape[1]} poses",
             remedy="Draw other errors, or ask for poses farther from the limits",
         )
-    platform, base = nests_of(machine)
+    if header is None:
+        title = f"virtual prototype of {machine.name}, {q.shape[1]} poses"
+        platform, base = nests_of(machine)
+        header = Header(named, title, platform_nests=platform, base_nests=base)
+    platform, base = dict(header.platform_nests), dict(header.base_nests)
     yaw = generator.uniform(-np.pi, np.pi)
     away = DISTANCE * machine.size
     frame = Frame.of((away * np.cos(yaw), away * np.sin(yaw), -0.3 * away, 0.0, 0.0, yaw))
@@ -96,9 +107,7 @@ def prototype_run(
             points = real.poses.points(place[:, None])
             visits += [(f"{k + 1}", nest, q[:, k], points[:, k]) for k in range(q.shape[1])]
             visits += _references(machine, base)
-    title = f"virtual prototype of {machine.name}, {q.shape[1]} poses"
-    header = Header(named, title, platform_nests=platform, base_nests=base)
-    return Prototype(_measured(header, visits, frame, sigma_mm, generator), parameters)
+    return Prototype(_measured(header, visits, frame, sigma_mm, generator, noise), parameters)
 
 
 def _references(machine: Machine, base: Mapping[str, Array]) -> list[Visit]:
@@ -111,12 +120,13 @@ def _measured(
     frame: Frame,
     sigma_mm: float,
     generator: np.random.Generator,
+    noise: float,
 ) -> Run:
     """Read what is visited, in the tracker's ``frame``, with equal noise in all directions."""
     position = np.full((len(visits), 3), np.nan)
     for row, (_, _, _, point) in enumerate(visits):
         if point is not None:
-            position[row] = frame.apply(point) + sigma_mm * generator.standard_normal(3)
+            position[row] = frame.apply(point) + noise * sigma_mm * generator.standard_normal(3)
     measured = np.array([point is not None for _, _, _, point in visits])
     covariance = np.where(measured, sigma_mm**2 * np.eye(3)[:, :, None], np.nan)
     return Run(

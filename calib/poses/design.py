@@ -1,7 +1,7 @@
 """Design of a measuring campaign: which poses, in which order, and what they will give."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from calib.mechanism.limits import Margin
 from calib.poses.choose import Candidates, Criterion, exchange, greedy
 from calib.poses.information import Accuracy, Judge, covariance, prior, whitened_rows
 from calib.poses.path import check_path, path_length, short_order
-from calib.poses.reach import PoseSet, sample_poses
+from calib.poses.reach import PoseSet, joined_poses, sample_poses
 from calib.poses.readings import Readings
 
 FRESH = 1000
@@ -206,6 +206,36 @@ def misses(design: Design, readings: Readings, fresh: PoseSet) -> float:
     return float(np.sqrt(max(off, 0.0)))
 
 
+def lengthened(
+    design: Design,
+    more: PoseSet,
+    readings: Readings,
+    generator: np.random.Generator,
+    margin: Margin | None = None,
+) -> Design:
+    """A design with more poses behind its own, in their order, and what all of them will give.
+
+    Raises
+    ------
+    BadInput
+        Naming the stretch of the way that leaves the limits.
+    """
+    machine = design.machine
+    whole = joined_poses(machine, [design.pose_set, more])
+    _check_way(whole, margin)
+    known = prior(whole, readings, priors=design.priors)
+    rows = whitened_rows(whole, readings, known.scale)
+    fresh = Judge.over(sample_poses(machine, FRESH, generator), readings, known.scale)
+    information = known.information + np.einsum("pin,qin->pq", rows, rows)
+    return replace(
+        design,
+        pose_set=whole,
+        labels=labels_for(whole.count),
+        accuracy=fresh.accuracy(covariance(information)),
+        length=path_length(machine, whole.q),
+    )
+
+
 def ordered(pose_set: PoseSet, margin: Margin | None = None) -> PoseSet:
     """Poses in the order of a short path that stays within limits, a margin kept free of them.
 
@@ -214,8 +244,13 @@ def ordered(pose_set: PoseSet, margin: Margin | None = None) -> PoseSet:
     BadInput
         Naming the stretch that leaves them.
     """
+    pose_set = pose_set.take(short_order(pose_set.machine, pose_set.q))
+    _check_way(pose_set, margin)
+    return pose_set
+
+
+def _check_way(pose_set: PoseSet, margin: Margin | None) -> None:
     machine = pose_set.machine
-    pose_set = pose_set.take(short_order(machine, pose_set.q))
     faults = check_path(machine, pose_set.q, margin)
     if faults:
         fault = faults[0]
@@ -226,4 +261,3 @@ def ordered(pose_set: PoseSet, margin: Margin | None = None) -> PoseSet:
             place=machine.source,
             remedy="Try another seed, or narrow [workspace].",
         )
-    return pose_set

@@ -134,7 +134,7 @@ def sample_poses(
         kept.append(found)
         have, drawn = have + found.count, drawn + batch
         if have >= count:
-            return _joined(machine, kept).take(slice(0, count))
+            return joined_poses(machine, kept).take(slice(0, count))
     raise BadInput(
         f"only {have} of {drawn} poses of the workspace box can be reached",
         place=machine.source,
@@ -142,7 +142,7 @@ def sample_poses(
     )
 
 
-def _joined(machine: Machine, parts: list[PoseSet]) -> PoseSet:
+def joined_poses(machine: Machine, parts: list[PoseSet]) -> PoseSet:
     """Pose sets one after the other."""
     if len(parts) == 1:
         return parts[0]

@@ -16,7 +16,8 @@ SIGNATURES = {
     "check_machine": "machine, *, closure='', seed=1",
     "choose_poses": "machine=None, n=29, *, site=None, criterion='I', priors=True, "
     "heights=False, calipers=0, calipers_um=20.0, sigma_um=None, angle_mdeg=None, candidates=2500, "
-    "seed=1, margin_mm=None, searches=1, workers=None, scheduler='', watch=None",
+    "seed=1, margin_mm=None, searches=1, workers=None, scheduler='', watch=None, "
+    "purpose='accuracy'",
     "compare": "runs, *, add=(), model=None, propose=None, watch=None",
     "complete": "machine, *, tool=False",
     "correct": "model, poses, *, machine=None, payload=None, temperature=None, channels=None, "
@@ -109,8 +110,9 @@ FIELDS = {
     "PredictReport": "model machine effects frame readings rms_um expected_um noise_um ratio "
     "chi2_per_dof log10_p p_value axes nests worst not_in_model bad_readings left_out_readings "
     "remarks record advice",
-    "PosesReport": "machine criterion readings tolerances_as_priors candidates seed predicted "
-    "random_poses by_count path_in_strokes pairs with_pairs kept_free poses",
+    "PosesReport": "machine criterion readings tolerances_as_priors candidates seed purpose "
+    "predicted random_poses by_count path_in_strokes pairs with_pairs kept_free will_see "
+    "not_asked poses",
     "SessionReport": "session run readings",
     "SessionsReport": "sessions",
     "SetsReport": "sets unknown",
