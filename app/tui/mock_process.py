@@ -1,7 +1,6 @@
 """A mock station as a process of this program's own: it starts, its words are kept, it ends."""
 
 import asyncio
-import contextlib
 import json
 from collections.abc import Callable, Sequence
 
@@ -81,8 +80,9 @@ class MockProcess:
 async def _end(process: asyncio.subprocess.Process) -> None:
     if process.returncode is not None:
         return
-    with contextlib.suppress(ProcessLookupError):
-        process.terminate()
+    # Its standard input ends it in its own order, also where terminate() would kill it (Windows).
+    assert process.stdin is not None
+    process.stdin.close()
     try:
         async with asyncio.timeout(END_S):
             await process.wait()

@@ -9,6 +9,7 @@ import asyncio
 import contextlib
 import logging
 import socket
+import struct
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -43,9 +44,7 @@ WATCH_PERIOD_S = 0.05
 BOOT_UP = 0
 SDO_DEADLINE_S = 1.0
 NO_LIBRARY = (can.CanInterfaceNotImplementedError, ImportError, NameError)
-UNKNOWN_WORDS = (TypeError, ValueError)
-CANNOT_OPEN = (can.CanError, OSError, AttributeError, *NO_LIBRARY, *UNKNOWN_WORDS)
-"""What python-can's interfaces raise when they do not open; a missing library has many faces."""
+UNKNOWN_WORDS = (TypeError, ValueError, struct.error)
 REMEDY_LINK = "Check cable, adapter and power; then connect again. The machine stops by itself."
 
 
@@ -141,11 +140,11 @@ class CanLink:
             link.closed = True
             what = f"did not open within {timeout} s"
             raise ConnectFailed(what, device=link.name, remedy=remedy) from error
-        except CANNOT_OPEN as error:
+        except Exception as error:  # python-can's interfaces raise whatever their libraries do
             link._workers.shutdown(wait=False)
             if isinstance(error, UNKNOWN_WORDS):
                 remedy = "Check [controller.can] against python-can's page of this interface."
-            elif isinstance(error, NO_LIBRARY):
+            elif isinstance(error, NO_LIBRARY) or "library not found" in str(error):
                 remedy = "Install the maker's driver and library, or choose another interface."
             raise ConnectFailed(str(error), device=link.name, remedy=remedy) from error
         link._watcher.start()

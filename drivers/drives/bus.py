@@ -78,7 +78,7 @@ class DriveBus(Nodes):
             set_up = self._set_ups[axis.node]
             await set_up.run()
             if self.plan.cyclic:
-                await take_setpoints(set_up.drive, self.plan.sync_s)
+                await take_setpoints(set_up.drive, axis, self.plan.sync_s)
         await super().watch()
 
     async def farewell(self) -> None:

@@ -12,6 +12,8 @@ from math import inf, sqrt
 
 from drivers.drives.axis import Axis
 
+PROFILE_VELOCITY, PROFILE_ACCELERATION, PROFILE_DECELERATION = 0x6081, 0x6083, 0x6084
+
 
 @dataclass(frozen=True)
 class Profile:

@@ -6,9 +6,12 @@ from collections.abc import Callable, Sequence
 from drivers.canopen.drive402 import AT_ONCE, ENABLE, NEW_SETPOINT, TARGET_POSITION, Drive402
 from drivers.drives.axis import Axis
 from drivers.drives.bus import DriveBus
-from drivers.drives.profile import Profile
-
-PROFILE_VELOCITY, PROFILE_ACCELERATION, PROFILE_DECELERATION = 0x6081, 0x6083, 0x6084
+from drivers.drives.profile import (
+    PROFILE_ACCELERATION,
+    PROFILE_DECELERATION,
+    PROFILE_VELOCITY,
+    Profile,
+)
 
 
 async def start_profiles(

@@ -8,6 +8,8 @@ from drivers.canopen.drive402 import (
     TARGET_POSITION,
     Drive402,
 )
+from drivers.drives.axis import Axis
+from drivers.drives.profile import PROFILE_VELOCITY, Profile
 from drivers.errors import DeviceFault, Refused
 
 SYNC = (0x80, b"")
@@ -22,11 +24,13 @@ def setpoint_frame(drive: Drive402, counts: int) -> tuple[int, bytes]:
     return BASE + drive.remote.id, struct.pack("<i", counts)
 
 
-async def take_setpoints(drive: Drive402, period_s: float) -> None:
+async def take_setpoints(drive: Drive402, axis: Axis, period_s: float) -> None:
     """Map 0x607A alone into RPDO 2, taken at each SYNC, and set 0x60C2; raises Refused.
 
-    0x60C2 is not in every drive: those without it take the period from SYNC itself. 0x1006 stays
-    as the drive holds it: one that watches SYNC by it may fault when a busy PC is late once.
+    0x6081 is set to the axis's speed: some drives bound set-points by it, and what stands there may
+    be the crawl of a short way in mode profile. 0x60C2 is not in every drive: those without it take
+    the period from SYNC itself. 0x1006 stays as the drive holds it: one that watches SYNC by it may
+    fault when a busy PC is late once.
     """
     if drive.has(SYNC_COB_ID):
         held = await drive.read(SYNC_COB_ID) & COB_ID_BITS
@@ -37,6 +41,7 @@ async def take_setpoints(drive: Drive402, period_s: float) -> None:
                 remedy='Set 0x1005 of this drive to 0x80, or use mode = "profile".',
             )
     await _map_setpoint(drive)
+    await drive.write(PROFILE_VELOCITY, Profile.of([axis], [0.0]).speed_of(axis, 0.0))
     if drive.has(INTERPOLATION, 1):
         await drive.write(INTERPOLATION, round(period_s * 1000.0), 1)
         await drive.write(INTERPOLATION, -3, 2)

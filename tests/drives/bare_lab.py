@@ -48,13 +48,13 @@ class Bare:
     def moving(self) -> bool:
         return any(leg.moving for leg in self.world.legs)
 
-    async def connect(self, serial: str = "", **changes: Any) -> DriveMotors:
+    def stated(self, **changes: Any) -> dict[str, Any]:
+        """The builder's settings, with changes."""
         stated = bare_site(self.world, self.channel, self.station.serials)
-        stated |= {"eds": [stated["eds"]], "silence_s": LOADED} | changes
-        settings = {one.name: stated.get(one.name, one.default) for one in KIND.settings}
-        scale = self.world.clock.scale
-        around = Surroundings(settings, serial, "hexapod", FACTS, {}, scale)
-        motors = await DriveMotors.connect(plan_of(around))
+        return stated | {"eds": [stated["eds"]], "silence_s": LOADED} | changes
+
+    async def connect(self, serial: str = "", **changes: Any) -> DriveMotors:
+        motors = await motors_of(self.stated(**changes), serial, self.world.clock.scale)
         motors.on_alarm(self.alarms.append)
         self.opened.append(motors)
         return motors
@@ -66,3 +66,11 @@ class Bare:
         for fact in FACTS:
             await motors.home(fact.name)
         return motors
+
+
+async def motors_of(stated: dict[str, Any], serial: str = "", scale: float = 1.0) -> DriveMotors:
+    """The driver of a machine, connected by its settings."""
+    settings = {one.name: stated.get(one.name, one.default) for one in KIND.settings}
+    return await DriveMotors.connect(
+        plan_of(Surroundings(settings, serial, "hexapod", FACTS, {}, scale))
+    )

@@ -2,8 +2,12 @@
 
 import asyncio
 import gc
+import json
+import os
+import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import can
 import pytest
@@ -180,6 +184,39 @@ async def test_without_the_pc_the_drives_stop_by_themselves(bare, on_silence, st
     await until(lambda: {drive.state for drive in bare.station.drives} <= ended, 5.0)
     await until(lambda: state in {drive.state for drive in bare.station.drives}, 5.0)
     assert bare.world.legs[0].position() < 10.0
+
+
+PROGRAM = """
+import asyncio, json, sys
+from bare_lab import FAR, motors_of
+async def main():
+    motors = await motors_of(json.loads(sys.argv[1]))
+    await motors.enable()
+    await motors.move_actuators(FAR)
+    await asyncio.sleep(60.0)
+asyncio.run(main())
+"""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("mode", ["profile", "cyclic"])
+async def test_a_program_that_is_killed_in_motion_leaves_drives_that_stop(bare, mode):
+    for number in range(1, 7):
+        bare.drive(number).attain()
+    told = bare.stated(speed=[2.0] * 6, mode=mode, silence_s=SHORT)
+    words = [sys.executable, "-c", PROGRAM, json.dumps(told)]
+    paths = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    program = await asyncio.create_subprocess_exec(*words, env={**os.environ, "PYTHONPATH": paths})
+    try:
+        await until(lambda: bare.world.legs[0].position() > 0.2, 60.0)
+    finally:
+        program.kill()
+        await program.wait()
+    where = bare.world.legs[0].position()
+    await until(lambda: {drive.state for drive in bare.station.drives} == {State.FAULT})
+    await until(lambda: not bare.moving)
+    # Nobody else is there to stop them, and the way of the longest was 16 mm.
+    assert bare.world.legs[0].position() - where < 12.0
 
 
 async def test_a_restart_is_a_fault_and_everything_is_set_up_again(bare):

@@ -55,9 +55,10 @@ class Wire:
 
 
 async def cyclic(bare: Bare, **changes: Any) -> DriveMotors:
-    """On and referenced, without the time that homing takes."""
+    """On and referenced at once; each has crept along in a profile before."""
     for number in range(1, 7):
         bare.drive(number).attain()
+        bare.drive(number).keep(0x6081, 0, 1)
     motors = await bare.connect(mode="cyclic", **changes)
     await motors.enable()
     return motors

@@ -53,14 +53,20 @@ async def _peak_um(bench: Bench, values: dict[str, float]) -> float:
         return worst
 
 
-async def test_killed_it_is_lost_and_comes_back_with_what_was_stored(tmp_path: Path) -> None:
+async def test_killed_in_motion_it_is_lost_and_comes_back_with_what_was_stored(
+    tmp_path: Path,
+) -> None:
     with running(tmp_path) as bench:
-        async with bench.driver() as controller:
+        async with bench.driver(speed_mm_s=8.0) as controller:
             value = NOMINAL["leg3.P_y"] + 0.1
             await controller.write_parameters({"leg3.P_y": value})
             await controller.store_parameters()
             await ready(controller)
+            await controller.move_to_pose((2.0, -3.0, -14.0, 0.02, 0.0, 0.03))
+            assert (await controller.state()).moving
             bench.station.cut()
+            with pytest.raises(LinkError, match="does not run"):
+                await controller.wait_arrived(20.0)
             with pytest.raises(LinkError, match="does not run"):
                 await keep_moving(controller)
         with pytest.raises(ConnectFailed, match="LinuxCNC"):

@@ -182,6 +182,31 @@ def test_ends_cleanly_on_a_signal(name: str) -> None:
     assert (process.returncode, errors) == (0, "")
 
 
+PARENT = """
+import subprocess, sys, time
+from app.again import command_of
+mock = command_of("mock", "hexapod", "--json", "--until-stdin-closes")
+station = subprocess.Popen(mock, stdin=subprocess.PIPE)
+print(station.pid, flush=True)
+time.sleep(60.0)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs /proc")
+def test_a_station_is_one_process_and_ends_with_a_program_that_is_killed() -> None:
+    parent = subprocess.Popen([sys.executable, "-c", PARENT], stdout=subprocess.PIPE, text=True)
+    try:
+        assert parent.stdout is not None
+        pid = int(parent.stdout.readline())
+        assert json.loads(parent.stdout.readline())["control"]
+        # Nothing below it could be left behind when it is ended from outside.
+        assert not Path(f"/proc/{pid}/task/{pid}/children").read_text().strip()
+    finally:
+        parent.kill()
+    # It holds the other end of that pipe as long as it lives.
+    assert parent.communicate(timeout=30.0)[0] == ""
+
+
 @pytest.mark.long
 def test_bad_input_ends_with_2(tmp_path: Path) -> None:
     hidden = tmp_path / "hidden.toml"
