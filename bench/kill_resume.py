@@ -1,13 +1,14 @@
 """Jobs killed (kill -9) at random moments: is every reading there exactly once?
 
-    python -m bench kill_resume [--kills 50] [--seed 1] [--of measure | verify | auto | mock]
+    python -m bench kill_resume [--kills 50] [--seed 1] [--of measure | verify | auto | mock | both]
 
 A mock station, sessions of six poses in three nests; each process is killed after a random time,
 until it comes through, again and again until there were enough kills. After every kill what the
 journal held must still be there in the same order; at the end of each session every planned
 reading must be there once, and the exported run must load. ``verify``: its answer must be there as
 well. ``auto``: every decision too, and none is taken twice. ``mock``: the station is killed and
-started anew while a measurement runs, which must end by itself, with a typed fault (exit code 3).
+started anew while a measurement runs, which must end by itself, with a typed fault (exit code 3);
+``both``: program and station at one moment.
 """
 
 import argparse
@@ -43,8 +44,12 @@ POSES = {
     "f": (2.0, 3.0, 214.0, -0.04, -0.04, 0.0),
 }
 HOST = "127.0.0.1"
-LONGEST_S = {"measure": 4.0, "verify": 4.0, "auto": 20.0, "mock": 4.0}
+LONGEST_S = {"measure": 4.0, "verify": 4.0, "auto": 20.0, "mock": 4.0, "both": 4.0}
 """Until a kill at the latest, by what is killed."""
+SAID = {
+    "mock": "the mock in sessions of measure",
+    "both": "program and mock at once in sessions of measure",
+}
 ALONE_S = 150.0
 
 
@@ -91,6 +96,8 @@ class Station:
         with contextlib.ExitStack() as stack:
             taken = [stack.enter_context(socket.create_server((HOST, 0))) for _ in range(3)]
             ports = [str(one.getsockname()[1]) for one in taken]
+        self.control = f"{HOST}:{ports[2]}"
+        """Where its back door is."""
         names = ("--controller-port", "--tracker-port", "--control-port")
         self._command = [
             sys.executable, "-m", "mocks.station", "hexapod", "--smrs", "3", "--json",
@@ -147,8 +154,12 @@ class Killer:
                 code = ended(process, ALONE_S, (0, 3))
                 self.station.start()
                 return code == 0
+            if self.of == "both":
+                self.station.kill()
             process.kill()
             process.communicate()
+            if self.of == "both":
+                self.station.start()
             return False
         if process.returncode:
             raise SystemExit(f"the program ended with {process.returncode}: {said.decode()}")
@@ -242,7 +253,7 @@ def main() -> None:
         finally:
             station.stop()
     spent, kills = time.monotonic() - begun, options.kills - killer.left
-    whom = "the mock in sessions of measure" if options.of == "mock" else options.of
+    whom = SAID.get(options.of, options.of)
     what = "autopilots" if options.of == "auto" else "sessions"
     ran, says = f"{kills} kills in {jobs} {what}", "nothing lost, nothing counted twice"
     print(f"{ran}, {spent:.0f} s, seed {options.seed}: {says}")

@@ -26,6 +26,8 @@ tracker-error       status: an Error packet that nobody asked for
 reset-tcp           of = "tracker" | "controller"
 time                answers machine time and scale
 truth               settled = false: answers true pose, parameters, frame (for judges)
+sets                answers the CRC-32 of the parameters that a CANopen controller holds, and
+                    those with which it began its motions, with how many (for judges)
 ==================  ==================================================================
 """
 
@@ -39,6 +41,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from mocks.canopen.server import CanopenStation
 from mocks.gauge import GaugeMock
 from mocks.physics.pose import rpy_from_rotation
 from mocks.tracker.instrument import BEAM_BROKEN_STATUS
@@ -95,6 +98,7 @@ class Hands:
             "reset-tcp": self._reset,
             "time": lambda a: {"time_s": world.clock.now(), "scale": world.clock.scale},
             "truth": self._truth,
+            "sets": self._sets,
         }
 
     def obey(self, request: Arguments) -> dict[str, Any]:
@@ -189,6 +193,11 @@ class Hands:
             self._controller.cut(reset=True)
         else:
             raise ValueError(f'of must be "tracker" or "controller", got {of!r}')
+
+    def _sets(self, a: Arguments) -> dict[str, Any]:
+        if not isinstance(self._controller, CanopenStation):
+            raise ValueError("this station's controller is not on CANopen")
+        return {"holds": self._controller.holds, "moved_with": self._controller.moved_with}
 
     def _truth(self, a: Arguments) -> dict[str, Any]:
         world = self._world

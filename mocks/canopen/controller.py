@@ -6,6 +6,7 @@ the machine does next.
 """
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from enum import IntEnum
 from functools import partial
@@ -91,6 +92,8 @@ class Controller(StationNode):
         self._pc_lost = False
         self._concerned, self._result = 0, Result.ACCEPTED
         self._reported = -1
+        self.moved_with: Counter[int] = Counter()
+        """How many motions were begun with a set of parameters, by its CRC-32: for judges."""
         self._install()
 
     def _install(self) -> None:
@@ -227,6 +230,7 @@ class Controller(StationNode):
         return Result.ACCEPTED
 
     def _move(self, targets: list[float]) -> None:
+        self.moved_with[self.parameters.checksum()] += 1
         setpoints = [self._setpoint(n, q) for n, q in enumerate(targets)]
         self._targets = targets
         way = max(

@@ -107,6 +107,17 @@ class CanopenStation:
         with self.network.lock:
             self._power_on()
 
+    @property
+    def moved_with(self) -> dict[str, int]:
+        """How many motions were begun with a set of parameters, by its CRC-32 in hex digits."""
+        counts = self.controller.moved_with if self.controller is not None else {}
+        return {f"{crc:08x}": count for crc, count in counts.items()}
+
+    @property
+    def holds(self) -> str:
+        """CRC-32 of the set in use, in hex digits; empty where there is no controller."""
+        return f"{self.controller.parameters.checksum():08x}" if self.controller else ""
+
     def cut(self, reset: bool = False) -> None:
         """Cut every client off the adapter (``reset`` with a TCP RST)."""
         self.endpoint.cut(reset)
