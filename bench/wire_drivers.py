@@ -39,15 +39,16 @@ from bench.wire_faults import behind, free_port, over_tcp, poses_of, truth_in
 from calib.frames import Frame
 from calib.mechanism.rigid import Poses
 from drivers import plausible
-from drivers.errors import DeviceError
+from drivers.errors import DeviceError, LinkError
 from drivers.interface import MotionController, Tracker
 from mocks.control import ControlClient
 
 T = TypeVar("T")
 HARM = 1.0 / 15.0
-SHARES = (0.05, 0.15, 0.4)
-"""How much of what passes is spoilt, in one round after another."""
+SHARES, OF_MANY = (0.05, 0.15, 0.4), (0.005, 0.02, 0.08)
+"""How much of what passes is spoilt, in one round after another; of links of many small frames."""
 LONGEST_S, ARRIVAL_S = 60.0, 20.0
+TRIES = 5
 DWELL_S, DWELLS = 0.5, 6
 NEST = "3"
 SAME_MM, SAME = 0.01, 1e-9
@@ -63,16 +64,17 @@ class On:
     words: tuple[str, ...] = ()
     scale: float = 600.0
     away_mm: float = 0.2
+    shares: tuple[float, ...] = SHARES
 
 
 LINKS = {
     "emscon": On("tracker"),
     "geocom": On("tracker", words=("--geocom",), scale=300.0, away_mm=2.0),
     "lines": On("tracker", words=("--lines",), scale=40.0),
-    "canopen": On("controller"),
+    "canopen": On("controller", shares=OF_MANY),
     "gcs": On("controller", "tripod"),
     "pose": On("controller", words=("--pose",)),
-    "bare": On("controller", words=("--bare",)),
+    "bare": On("controller", words=("--bare",), shares=OF_MANY),
 }
 
 
@@ -102,7 +104,7 @@ class Trial:
 
     def __post_init__(self) -> None:
         self.on = LINKS[self.name]
-        self.until = time.monotonic() + self.options.seconds
+        self.until = 0.0
 
     async def timed(self, what: str, deed: Awaitable[T]) -> T:
         """A call that must end within a minute; the longest is remembered."""
@@ -116,25 +118,27 @@ class Trial:
         finally:
             self.longest = max(self.longest, (time.monotonic() - begun, what))
 
-    async def rounds(self, folder: Path, number: int) -> None:
+    async def rounds(self, site: Site, number: int) -> None:
         """One mock: a clean round, then spoilt ones until there were enough faults."""
         dice = random.Random(f"{self.options.seed} {self.name} {number}")
-        port = free_port()
-        words = ["--truth", str(truth_in(folder / "truth")), "--controller-port", str(port)]
-        with mock_station(
-            self.on.machine, 1, self.on.scale, folder, [*words, *self.on.words]
-        ) as file:
-            site = over_tcp(file, port)
-            place = _nest(site) if self.on.link == "tracker" else (0.0, 0.0, 0.0)
+        place = _nest(site) if self.on.link == "tracker" else (0.0, 0.0, 0.0)
+        clean = await self._clean(site, place)
+        while sum(self.faults.values()) < self.options.faults and time.monotonic() < self.until:
+            spoilt, proxy = behind(site, self.on.link, dice, HARM)
+            proxy.spoil(dice.choice(self.on.shares))
+            said = Said()
+            self.ends[await self._ended(spoilt, place, said, proxy)] += 1
+            self.faults += proxy.faults
+            self.judge(said, clean)
+
+    async def _clean(self, site: Site, place: tuple[float, float, float]) -> Said:
+        """A round as it is; a busy computer may be too late for a deadline."""
+        for _ in range(TRIES):
             clean = Said()
-            await self.round(site, place, clean)
-            while sum(self.faults.values()) < self.options.faults and time.monotonic() < self.until:
-                spoilt, proxy = behind(site, self.on.link, dice, HARM)
-                proxy.spoil(dice.choice(SHARES))
-                said = Said()
-                self.ends[await self._ended(spoilt, place, said, proxy)] += 1
-                self.faults += proxy.faults
-                self.judge(said, clean)
+            with contextlib.suppress(LinkError):
+                await self.round(site, place, clean)
+                return clean
+        raise SystemExit(f"{self.name}: no clean round in {TRIES} tries")
 
     async def _ended(
         self, site: Site, place: tuple[float, float, float], said: Said, proxy: Proxy
@@ -242,12 +246,23 @@ class Trial:
             self.other[what] += 1
             print(f"{self.name}: {what} off by {off:.6g} were taken", flush=True)
 
-    async def all(self, folder: Path) -> None:
+    def all(self, folder: Path) -> None:
         """Several mocks at once: most of the time they wait."""
-        for number in range(self.options.lines):
-            (folder / str(number)).mkdir()
-        lines = (self.rounds(folder / str(k), k) for k in range(self.options.lines))
-        await asyncio.gather(*lines)
+        with contextlib.ExitStack() as stack:
+            sites = []
+            for number in range(self.options.lines):
+                own = folder / str(number)
+                own.mkdir()
+                port = free_port()
+                words = ["--truth", str(truth_in(own / "truth")), "--controller-port", str(port)]
+                words += self.on.words
+                station = mock_station(self.on.machine, 1, self.on.scale, own, words)
+                sites.append(over_tcp(stack.enter_context(station), port))
+            self.until = time.monotonic() + self.options.seconds
+            asyncio.run(self._together(sites))
+
+    async def _together(self, sites: list[Site]) -> None:
+        await asyncio.gather(*(self.rounds(site, k) for k, site in enumerate(sites)))
 
     def says(self, spoken: str) -> str:
         """What is to be said on the page."""
@@ -285,7 +300,7 @@ def main() -> int:
     trial, spoken, begun = Trial(options.on, options), io.StringIO(), time.monotonic()
     with tempfile.TemporaryDirectory() as name, contextlib.redirect_stderr(spoken):
         os.environ["PKMCAL_STATE"] = str(Path(name) / "state")
-        asyncio.run(trial.all(Path(name)))
+        trial.all(Path(name))
     words = spoken.getvalue()
     says, total = trial.says(words), sum(trial.faults.values())
     harmful = sum(trial.faults[fault] for fault in ENDING)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from canopen.sdo.exceptions import SdoAbortedError
 
-from drivers.canopen.link import Device
+from drivers.canopen.device import Device
 
 CONTROLWORD = 0x6040
 RPDO_COMMUNICATION, RPDO_MAPPING = 0x1400, 0x1600

@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from drivers.canopen import layout as at
+from drivers.canopen.bus_address import BusAddress
 from drivers.canopen.drive402 import DISABLE_VOLTAGE, REFERENCED, STATUSWORD, Drive402, state_name
 from drivers.canopen.eds import eds_path
 from drivers.canopen.layout import read_layout
-from drivers.canopen.link import BusAddress, CanLink
+from drivers.canopen.link import CanLink
 from drivers.canopen.machine_bus import MachineBus
 from drivers.canopen.motion import MOVE_TO_POSE, MOVE_TO_Q, PREPARE
 from drivers.canopen.parameter_access import ParameterAccess

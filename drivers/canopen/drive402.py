@@ -13,7 +13,7 @@ from collections.abc import Callable
 from canopen.objectdictionary import ODVariable
 
 from drivers.canopen.control_frame import Address, ReceivePdo, control_pdo
-from drivers.canopen.link import Device
+from drivers.canopen.device import Device
 from drivers.errors import DriveFault, ProtocolError, Refused, Silence
 
 CONTROLWORD, STATUSWORD, MODE, MODE_DISPLAY = 0x6040, 0x6041, 0x6060, 0x6061

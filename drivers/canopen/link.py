@@ -12,9 +12,8 @@ import socket
 import struct
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -23,6 +22,8 @@ import canopen
 from canopen.emcy import EmcyError
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
+from drivers.canopen.bus_address import BusAddress
+from drivers.canopen.device import Device
 from drivers.canopen.eds import dictionary
 from drivers.canopen.reader import FrameReader
 from drivers.canopen.sdo_abort import REMEDIES, UNUSUAL, abort_words
@@ -33,6 +34,7 @@ from drivers.errors import (
     DeviceFault,
     HeartbeatLost,
     LinkLost,
+    ProtocolError,
     Refused,
     Silence,
 )
@@ -46,59 +48,6 @@ SDO_DEADLINE_S = 1.0
 NO_LIBRARY = (can.CanInterfaceNotImplementedError, ImportError, NameError)
 UNKNOWN_WORDS = (TypeError, ValueError, struct.error)
 REMEDY_LINK = "Check cable, adapter and power; then connect again. The machine stops by itself."
-
-
-@dataclass(frozen=True)
-class BusAddress:
-    """Where the bus is, in python-can's words, and how we behave on it.
-
-    ``heartbeat_s`` is the period of our own heartbeat and of theirs, ``silence_s`` the wall time
-    without one after which a partner counts as lost, on either side.
-    """
-
-    interface: str
-    channel: str
-    bitrate: int | None = None
-    pc_node: int = 127
-    heartbeat_s: float = 0.1
-    silence_s: float = 1.0
-    more: Mapping[str, Any] = field(default_factory=dict)
-    """Further keywords of the interface."""
-
-    def options(self) -> dict[str, Any]:
-        """Return the keyword arguments of ``can.Bus``."""
-        options: dict[str, Any] = {"interface": self.interface, "channel": self.channel}
-        if self.bitrate is not None:
-            options["bitrate"] = self.bitrate
-        if self.interface == "slcan":
-            # A longer read time-out costs no latency (a read ends with its first byte) and keeps
-            # an idle bus from waking the processor a thousand times a second.
-            options["timeout"] = 0.05
-            if self.channel.startswith("socket://"):
-                options["sleep_after_open"] = 0
-        return {**options, **self.more}
-
-
-class Device:
-    """A remote node on a link, with blocking access (for :meth:`call`) and the way to it."""
-
-    def __init__(self, link: "CanLink", node_id: int, label: str, node: canopen.RemoteNode) -> None:
-        self.link = link
-        self.id = node_id
-        self.label = label
-        self.node = node
-
-    async def call(self, action: Callable[[], T]) -> T:
-        """Run blocking ``action`` in a worker thread; raises as :meth:`CanLink.call`."""
-        return await self.link.call(self.id, action)
-
-    def upload(self, index: int, sub: int = 0) -> bytes:
-        """Read an object; blocking."""
-        return bytes(self.node.sdo.upload(index, sub))
-
-    def download(self, index: int, sub: int, data: bytes) -> None:
-        """Write an object; blocking."""
-        self.node.sdo.download(index, sub, data)
 
 
 class CanLink:
@@ -192,7 +141,8 @@ class CanLink:
     async def call(self, node_id: int, action: Callable[[], T]) -> T:
         """Run blocking ``action`` on a node in a worker thread.
 
-        Raises Refused (SDO abort, with code), Silence (no answer) or LinkLost.
+        Raises Refused (SDO abort, with code), Silence (no answer), ProtocolError (an answer of
+        another size than the EDS file says) or LinkLost.
         """
         self._must_be_open()
         return await self._loop.run_in_executor(self._workers, self._locked, node_id, action)
@@ -214,6 +164,12 @@ class CanLink:
                 ) from error
             except SdoCommunicationError as error:
                 raise self._unanswered(node_id, error) from error
+            except (struct.error, canopen.ObjectDictionaryError) as error:
+                raise ProtocolError(
+                    f"an answer of another size than the object has ({error})",
+                    device=self.label(node_id),
+                    remedy="Check that the EDS file is this device's, then the adapter's cable.",
+                ) from error
             except (can.CanError, OSError, RuntimeError) as error:
                 raise self._lost(error) from error
 

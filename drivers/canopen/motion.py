@@ -13,13 +13,14 @@ import time
 from collections.abc import Callable, Sequence
 
 from drivers.canopen import layout as at
+from drivers.canopen.device import Device
 from drivers.canopen.layout import Layout
-from drivers.canopen.link import Device
 from drivers.canopen.motion_status import INTERRUPTED, MotionStatus
 from drivers.errors import DeviceFault, Silence
 
 ANSWER_DEADLINE_S = 1.0
 POLL_S = 0.5
+REAL64 = struct.Struct("<d")
 MOVE_TO_POSE, MOVE_TO_Q, STOP, PREPARE = 1, 2, 3, 0x10
 
 
@@ -42,10 +43,12 @@ class MotionChannel:
             lambda pdo: link.in_loop(self._on_status, MotionStatus.from_bytes(bytes(pdo.data)))
         )
         for n, target in enumerate(targets):
-            target.add_callback(lambda pdo, n=n: link.in_loop(self._on_target, n, bytes(pdo.data)))
+            target.add_callback(
+                lambda pdo, n=n: link.in_loop(self._on_target, n, *REAL64.unpack(pdo.data))
+            )
 
-    def _on_target(self, n: int, data: bytes) -> None:
-        (self._targets[n],) = struct.unpack("<d", data)
+    def _on_target(self, n: int, q: float) -> None:
+        self._targets[n] = q
 
     def _on_status(self, status: MotionStatus) -> None:
         self.status = status

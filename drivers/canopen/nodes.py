@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 
+from drivers.canopen.device import Device
 from drivers.canopen.drive402 import (
     DISABLE_VOLTAGE,
     ENABLE,
@@ -15,7 +16,7 @@ from drivers.canopen.drive402 import (
     drive_fault,
     state_name,
 )
-from drivers.canopen.link import CanLink, Device
+from drivers.canopen.link import CanLink
 from drivers.errors import ConnectFailed, DeviceError, HeartbeatLost, LinkLost, Silence
 from drivers.interface import Alarm
 from drivers.stopping import STILL_MOVING

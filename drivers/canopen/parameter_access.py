@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from canopen.sdo.exceptions import SdoAbortedError
 
 from drivers.canopen import layout as at
+from drivers.canopen.device import Device
 from drivers.canopen.layout import Address, Layout
-from drivers.canopen.link import Device
 from drivers.canopen.sdo_abort import REMEDIES, abort_words
 from drivers.errors import ParameterError, Refused
 

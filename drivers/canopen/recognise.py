@@ -4,8 +4,8 @@ import struct
 from collections.abc import Mapping
 
 from drivers.canopen import layout as at
+from drivers.canopen.device import Device
 from drivers.canopen.layout import Layout
-from drivers.canopen.link import Device
 from drivers.errors import Refused
 from drivers.interface import Identity
 

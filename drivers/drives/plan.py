@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from drivers.canopen.link import BusAddress
+from drivers.canopen.bus_address import BusAddress
 from drivers.drives.axis import Axis
 from drivers.kind import Surroundings
 

@@ -5,7 +5,8 @@ import pytest
 from can.interfaces.virtual import VirtualBus
 
 from drivers.canopen import CanopenController
-from drivers.canopen.link import BusAddress, CanLink
+from drivers.canopen.bus_address import BusAddress
+from drivers.canopen.link import CanLink
 from drivers.errors import ConnectFailed
 
 THERE = {"virtual", "udp_multicast", "socketcand"}

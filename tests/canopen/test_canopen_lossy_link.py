@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from drivers.canopen import CanopenController
 from drivers.canopen.slcan_bus import is_whole
-from drivers.errors import HeartbeatLost, LinkLost
+from drivers.errors import HeartbeatLost, LinkLost, ProtocolError
 from drivers.interface import Alarm
 from mocks.canopen.slcan import Frame, encode
 
@@ -124,6 +124,19 @@ async def test_damaged_frames_are_ignored_counted_and_told(
     assert any("damaged frame" in alarm.what and not alarm.fault for alarm in told)
     await controller.close()
     assert "Traceback" not in capfd.readouterr().err
+
+
+async def test_an_answer_of_another_size_than_the_object_has_is_refused(middleman: Middleman):
+    controller = await CanopenController.connect("slcan", middleman.channel)
+    # The first of several frames (0x41) becomes the only one (0x43), with four bytes of eight.
+    middleman.garbles = lambda line: line.replace(b"t58A8411224", b"t58A8431224")
+    with pytest.raises(ProtocolError, match="another size") as refused:
+        await controller.state()
+    assert "controller" in refused.value.device
+    assert "EDS" in refused.value.remedy
+    middleman.garbles = lambda line: line
+    assert len((await controller.state()).actuators) == 6
+    await controller.close()
 
 
 @pytest.mark.long

@@ -9,7 +9,7 @@ import pytest
 
 from drivers.canopen import CanopenController
 from drivers.canopen import layout as at
-from drivers.canopen.link import Device
+from drivers.canopen.device import Device
 from drivers.canopen.parameter_access import ParameterAccess
 from drivers.errors import ParameterError, Refused
 from mocks.physics.truth import machine_file
