@@ -174,8 +174,8 @@ def accuracy_section(
     blocks: list[Block] = [
         Text(
             f"{_counts(before, after)} that were not used in any fit ({box} mm, base frame). "
-            "Errors are wanted to measured, in the axes of the base frame; they hold the noise of "
-            "the tracker."
+            "Errors lead from the wanted pose to the measured one, in the axes of the base frame; "
+            "they hold the noise of the tracker."
         ),
         _axes_table(before, after),
         Picture.of(

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter, ScalarFormatter
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from calib.arrays import Array
 
@@ -79,7 +79,7 @@ def errors_by_pose(
     ):
         axis.set_ylabel(unit)
         axis.set_xlim(0, len(places) + 1)
-        axis.yaxis.set_major_formatter(ScalarFormatter())
+        axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.yaxis.set_minor_formatter(NullFormatter())
         if limit:
             axis.axhline(limit, color=INK, lw=0.8, ls="--")

@@ -2,9 +2,10 @@
 
 import asyncio
 import contextlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from app.errors import GateRefused, StoppedByOperator
 from app.files.fits import read_fit
@@ -13,6 +14,7 @@ from app.session import events as ev
 from app.session.known import Snapshot, compare_with_known
 from app.session.session import Session
 from app.session.station import Station
+from app.tui.wording import said
 from app.writeback.gates import Gates
 from app.writeback.procedure import WriteBack, accept, judged, undo
 from app.writeback.proposal import Proposal
@@ -117,13 +119,8 @@ class Corrections:
 
     def _tell_end(self, error: Exception) -> None:
         picture = self._desk.picture
-        stages = [stage.stage for stage in picture.stages]
-        stopped = isinstance(error, StoppedByOperator)
-        picture.run = "stopped" if stopped else "fault"
-        if stages and stages[-1] == "restored":
-            why = "stopped by the operator" if stopped else str(getattr(error, "what", error))
-            remedy = str(getattr(error, "remedy", "")) if not stopped else ""
-            picture.say_trouble(f"Not kept: {why}. The earlier parameters are back", remedy, "warn")
+        picture.run = "stopped" if isinstance(error, StoppedByOperator) else "fault"
+        picture.say_trouble(*end_words([stage.stage for stage in picture.stages], error))
 
     async def refuse(self) -> None:
         """Raise why nothing can be applied now."""
@@ -143,6 +140,8 @@ class Corrections:
             f"{before.position_rms_um:.1f} -> {after.position_rms_um:.1f} um. Keep them for good?"
         )
         tell = self._desk.picture.tell
+        if self._desk.station is not None:
+            self.list_snapshots(self._desk.station)
         self._answer = asyncio.get_running_loop().create_future()
         tell(ev.PromptNeeded(KEEP, text, ("keep", "put back"), "put back"))
         given = ""
@@ -193,3 +192,16 @@ class Corrections:
         """Look at the sets that there are."""
         self.snapshots = tuple(snapshots_of(station).all()) if station.connected else ()
         self._desk.picture.revision += 1
+
+
+def end_words(stages: Sequence[str], error: Exception) -> tuple[str, str, Literal["warn", "bad"]]:
+    """What a write-back that ended early means for what was written, what to do, and how bad."""
+    what, remedy = said(error)
+    if isinstance(error, StoppedByOperator):
+        what, remedy = "stopped by the operator", ""
+    if "write" not in stages:
+        return f"Nothing was written: {what}", remedy, "warn"
+    if stages[-1] == "restored":
+        return f"Not kept: {what}. The earlier parameters are back", remedy, "warn"
+    remedy = "Nothing moves until a set is brought back: u on the Apply screen (5)"
+    return f"What the controller holds is not known: {what}", remedy, "bad"

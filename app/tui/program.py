@@ -165,11 +165,11 @@ class Workbench(Painted[None]):
     def put_up(self, error: Exception) -> None:
         """Put an error on the banner: what happened and what to do.
 
-        A fault of the job stands there already, in its own words, which say how to go on.
+        A fault of the job stands there already, in words that say what it means and how to go on.
         """
         what, remedy = map(micro, said(error))
         picture = self.desk.picture
-        if picture.trouble is not None and picture.trouble.what.startswith(what):
+        if picture.trouble is not None and what in picture.trouble.what:
             return
         if isinstance(error, (BadInput, GateRefused)):
             picture.refuse(what, remedy)

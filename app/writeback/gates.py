@@ -99,7 +99,7 @@ def gates_of_proposal(
     chi2 = quality.get("chi2_per_dof", math.nan)
     checked.append(gates.check("chi2", chi2, "", "chi-square per degree of freedom of the fit"))
     ratio = quality.get("holdout_rms_um", math.nan) / quality.get("holdout_floor_um", math.nan)
-    says = "RMS of poses that the fit had not seen, over what a perfect model would show"
+    says = "RMS of poses that the fit had not seen, over that of a perfect model"
     checked.append(gates.check("holdout", ratio, "", says))
     old = machine.vector({p.name: held[p.name] for p in machine.parameters})
     new = machine.vector({p.name: new_values[p.name] for p in machine.parameters})
@@ -204,11 +204,11 @@ def gates_of_check(
 ) -> list[GateChecked]:
     """What must be true of poses measured with the new parameters, before they are kept."""
     peak = max(after.position_peak_um - noise_peak_um, 0.0)
-    says = "peak position error at the check poses beyond what tracker noise alone shows"
+    says = "peak position error at the check poses beyond the tracker's noise"
     checked = [gates.check("check-peak", peak, "um", says)]
     allowed = max(before.position_rms_um, noise_peak_um)
     says = (
-        f"RMS position error at the check poses after ({after.position_rms_um:.1f} um) over "
+        f"RMS error at the check poses after ({after.position_rms_um:.1f} um) over "
         f"before ({before.position_rms_um:.1f} um)"
     )
     checked.append(gates.check("check-rms", after.position_rms_um / allowed, "", says))

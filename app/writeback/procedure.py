@@ -117,7 +117,8 @@ class WriteBack:
         held, proposal = await self.propose()
         snapshots = snapshots_of(self.station)
         snapshot = snapshots.save(held, f"before applying {Path(self.fit.source).name}")
-        self._stage("snapshot", f"{len(held.values)} parameters saved: {snapshots.path(snapshot)}")
+        saved = f"{len(held.values)} parameters saved as set {snapshot.number}"
+        self._stage("snapshot", f"{saved}: {snapshots.path(snapshot)}")
         before = await self._measure("before", held.values)
         after = before
         wanted = Wanted(proposal.over(held.values), proposal.own)
@@ -193,7 +194,8 @@ class WriteBack:
     async def _restore(self, snapshot: Snapshot, why: BaseException) -> None:
         """Bring the earlier set back after a failure; a second failure latches "unknown"."""
         self._stopping = False
-        self._stage("restore", f"set {snapshot.number}, because: {why or 'stopped'}")
+        reason = str(why) or "stopped by the operator"
+        self._stage("restore", f"set {snapshot.number} is to come back, because: {reason}")
         try:
             await asyncio.shield(_put_back(self.station, snapshot, stored=self._stored))
         except (DeviceError, OSError) as again:

@@ -6,9 +6,13 @@ from pathlib import Path
 import pytest
 from test_tui_end_to_end import SCALE, new_run, start_mock, until
 
+from app.errors import StoppedByOperator
 from app.session.hands import MockControl
+from app.tui.correction import end_words
+from app.tui.picture import Picture
 from app.tui.program import Workbench
 from app.tui.widgets.frame import Banner
+from drivers.errors import DriveFault
 
 
 @pytest.fixture(autouse=True)
@@ -60,3 +64,44 @@ async def test_beam_that_is_broken_is_waited_for(tmp_path: Path) -> None:
         await pilot.press("ctrl+x")
         await until(pilot, lambda: desk.picture.run == "stopped")
         await desk.close()
+
+
+LINK = DriveFault("it no longer hears the PC", device="drive q1", remedy="Look at the cable")
+DONE = ["snapshot", "verify", "write", "read-back", "verify", "restore"]
+
+
+@pytest.mark.parametrize(
+    ("stages", "error", "says", "level"),
+    [
+        ([], LINK, "Nothing was written: drive q1: it no longer hears the PC", "warn"),
+        (DONE[:2], StoppedByOperator("x"), "Nothing was written: stopped by the operator", "warn"),
+        ([*DONE, "restored"], LINK, "The earlier parameters are back", "warn"),
+        ([*DONE, "restore-failed"], LINK, "What the controller holds is not known", "bad"),
+    ],
+)
+async def test_a_fault_of_a_write_back_says_what_it_means_for_what_was_written(
+    tmp_path: Path, stages: list[str], error: Exception, says: str, level: str
+) -> None:
+    bench = Workbench(root=tmp_path)
+    picture = bench.desk.picture
+    picture.say_trouble(*end_words(stages, error))
+    if not isinstance(error, StoppedByOperator):
+        bench.put_up(error)  # as it is raised on, it is said no less well
+    assert picture.trouble is not None
+    assert says in picture.trouble.what
+    assert picture.trouble.level == level
+    assert "resume" not in picture.trouble.remedy
+
+
+def test_what_a_key_could_not_do_covers_a_fault_until_the_next_key() -> None:
+    picture = Picture()
+    picture.say_trouble("drive q1: it no longer hears the PC", "Look at the cable")
+    fault = picture.trouble
+    for _ in range(2):
+        picture.refuse("there is no run yet", "Measure one")
+        assert picture.trouble is not None
+        assert picture.trouble.what == "there is no run yet"
+    picture.pass_on()
+    assert picture.trouble is fault
+    picture.pass_on()
+    assert picture.trouble is fault

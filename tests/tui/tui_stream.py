@@ -218,8 +218,8 @@ def compared() -> Comparison:
             1.73,
             1.5,
             "",
-            "holdout: RMS of poses that the fit had not seen, over what a perfect model would "
-            "show: 1.73 (at most 1.5)",
+            "holdout: RMS of poses that the fit had not seen, over that of a perfect model: "
+            "1.73 (at most 1.5)",
         ),
     )
     return Comparison(Path("model.toml"), Proposal(changes, left_out), gates)

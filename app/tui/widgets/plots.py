@@ -12,6 +12,7 @@ from textual_plot.axis_formatter import NumericAxisFormatter
 
 from app.tui.parts import Point
 from app.tui.theme import BASE, SERIES, tinted
+from app.tui.wording import micro
 
 MOST = 400
 """More points than this cannot be told apart on a terminal."""
@@ -161,7 +162,7 @@ class SeriesPlot(QuietPlot):
         if not self.changed(key):
             return
         self.clear()
-        scale, unit = (1e3, "µm") if unit == "mm" else (1.0, unit)
+        scale, unit = (1e3, "µm") if unit == "mm" else (1.0, micro(unit))
         middle = float(values[-1]) if scale == 1e3 else 0.0
         y, sigma = scale * (values - middle), scale * sigmas
         low, high = float(np.min(y - sigma)), float(np.max(y + sigma))
