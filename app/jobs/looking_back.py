@@ -14,7 +14,11 @@ from app.jobs.remembering import remember_verifications
 from calib.errors import BadInput
 from calib.trend import Drift, change, drift
 
-MONTH_S = 30.4375 * 86400.0
+DAY_S = 86400.0
+MONTH_S = 30.4375 * DAY_S
+SPAN_S = DAY_S
+"""Time that calibrations must lie apart before a drift is told of them: what an afternoon says of
+a month is noise, multiplied."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,12 +155,22 @@ def _machine(
 
 
 def _last_fits(entries: Sequence[Entry]) -> list[Entry]:
-    """Of each set of runs the fit that was made last, in the order in which they were measured."""
+    """Of each set of runs the fit that was made last, in the order in which they were measured.
+
+    A fit of several runs together is none beside fits of some of them: what they share would pass
+    for two calibrations that agree.
+    """
     last: dict[tuple[str, ...], Entry] = {}
     for entry in entries:
         if entry.kind == "fit":
             last[tuple(entry.said["runs"])] = entry
-    return sorted(last.values(), key=lambda entry: entry.utc)
+    seen: set[str] = set()
+    alone = []
+    for runs, entry in sorted(last.items(), key=lambda item: len(item[0])):
+        if seen.isdisjoint(runs):
+            seen.update(runs)
+            alone.append(entry)
+    return sorted(alone, key=lambda entry: entry.utc)
 
 
 def _allowed(machine: str) -> dict[str, tuple[float, float]]:
@@ -179,7 +193,9 @@ def _series(
     if len(points) > 1:
         last = change(points[-2][2:], points[-1][2:], among)
     months = [(when - points[-1][0]) / MONTH_S for when, *_ in points]
-    line = drift(months, [p[2] for p in points], [p[3] for p in points], among)
+    line = None
+    if points[-1][0] - min(when for when, *_ in points) >= SPAN_S:
+        line = drift(months, [p[2] for p in points], [p[3] for p in points], among)
     return {
         "name": name,
         "unit": unit,

@@ -92,7 +92,9 @@ class ApplyFace(Face):
             self._stages = len(picture.stages)
             stages = self.query_one("#apply-stages", VerticalScroll)
             self.call_after_refresh(stages.scroll_end, animate=False)
-        self.query_one("#apply-sets", Static).update(sets_text(corrections.snapshots))
+        self.query_one("#apply-sets", Static).update(
+            sets_text(corrections.snapshots, corrections.in_use)
+        )
         drawn = (comparison, self.wide, self.desk.study.answer)
         if drawn != self._drawn:
             self._drawn = drawn
@@ -167,7 +169,10 @@ class ApplyFace(Face):
             if not sets:
                 self.notify("There is no earlier set of this controller.")
                 return
-            options = [(str(each.number), set_line(each)) for each in reversed(sets)]
+            held = self.desk.corrections.in_use
+            options = [
+                (str(each.number), set_line(each, each.number in held)) for each in reversed(sets)
+            ]
             self.app.push_screen(
                 Pick("Undo", "Which set is to be brought back, for good?", options), picked
             )
@@ -274,14 +279,18 @@ def stages_text(picture: Picture, left_out: Mapping[str, str]) -> Content:
     return Content("\n").join(lines)
 
 
-def sets_text(snapshots: tuple[Snapshot, ...]) -> Content:
-    """The latest parameter sets, newest first."""
+def sets_text(snapshots: tuple[Snapshot, ...], held: Collection[int]) -> Content:
+    """The latest parameter sets, newest first; ``held`` are those that the controller holds."""
     if not snapshots:
         return Content.from_markup("[dim]none yet[/]")
-    return Content("\n").join(Content(set_line(each)) for each in reversed(snapshots[-12:]))
+    return Content("\n").join(
+        Content(set_line(each, each.number in held)) for each in reversed(snapshots[-12:])
+    )
 
 
-def set_line(snapshot: Snapshot) -> str:
-    """One parameter set in a line."""
+def set_line(snapshot: Snapshot, held: bool) -> str:
+    """One parameter set in a line, with a sign if the controller holds it."""
     when = snapshot.taken_utc.replace("T", " ").removesuffix("+00:00")
-    return f"{snapshot.number:>3}  {when}  {snapshot.why}"
+    mark = "▶" if held else " "
+    now = "  (in the controller)" if held else ""
+    return f"{mark}{snapshot.number:>3}  {when}  {snapshot.why}{now}"

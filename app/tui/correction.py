@@ -53,6 +53,8 @@ class Corrections:
         self._desk = desk
         self.comparison: Comparison | None = None
         self.snapshots: tuple[Snapshot, ...] = ()
+        self.in_use: frozenset[int] = frozenset()
+        """Numbers of the sets that the controller holds, as far as this program left it."""
         self.running: WriteBack | None = None
         self._answer: asyncio.Future[str] | None = None
 
@@ -128,6 +130,12 @@ class Corrections:
         if self.comparison is None:
             raise GateRefused("nothing is compared yet", remedy="Compare first (c) and look at it")
         failed = ", ".join(gate.gate for gate in self.comparison.gates if not gate.passed)
+        if failed == "gain":
+            raise GateRefused(
+                "nothing would be gained: what the controller holds is as good as this fit",
+                remedy="Nothing was written; more poses, or several runs together (3 o), may do "
+                "better",
+            )
         raise GateRefused(
             f"gates refuse: {failed}", remedy="Measure more, or fit again; nothing was written"
         )
@@ -190,7 +198,12 @@ class Corrections:
 
     def list_snapshots(self, station: Station) -> None:
         """Look at the sets that there are."""
-        self.snapshots = tuple(snapshots_of(station).all()) if station.connected else ()
+        known = snapshots_of(station) if station.connected else None
+        self.snapshots = tuple(known.all()) if known is not None else ()
+        held = known.expected() if known is not None and not known.unknown() else None
+        self.in_use = frozenset(
+            each.number for each in self.snapshots if held and each.checksum == held.checksum
+        )
         self._desk.picture.revision += 1
 
 

@@ -87,9 +87,10 @@ class HistoryFace(Face):
         events.border_subtitle = f"{number} of {count}; n: the next" if count > 1 else ""
         self.query_one("#history-events-text", Static).update(events_text(machine))
         table: DataTable[Text] = self.query_one("#history-table", DataTable)
-        heads = ("parameter", "before", "now", "change", "±", "p")
+        heads = ("parameter", "before", "now", "change", "±", "p", "unit")
         rows = [series_row(one) for one in self._series]
-        fill(table, heads, rows, most=24, gap=2 if self.wide else 1)
+        gap = 2 if self.wide else 1
+        fill(table, heads, rows, left=(0, len(heads) - 1), most=24, gap=gap)
         table.border_subtitle = told(self._series)
         self._draw_marked()
 
@@ -141,11 +142,11 @@ def series_row(one: "SeriesEntry") -> list[Text]:
     changed = one.changed or (one.drift is not None and one.drift.clear)
     style = "bold" if changed else "dim"
     now, _ = with_uncertainty(one.values[-1], one.sigmas[-1])
-    cells = [("! " if changed else "  ") + one.name, "", now, "", "", ""]
+    cells = [("! " if changed else "  ") + one.name, "", now, "", "", "", micro(one.unit)]
     if one.change is not None and one.change_sigma is not None and one.p_value is not None:
         change, sigma = with_uncertainty(one.change, one.change_sigma)
         before, _ = with_uncertainty(one.values[-2], one.sigmas[-2])
-        cells[1], cells[3:] = before, [change, sigma, p_text(one.p_value)]
+        cells[1], cells[3:6] = before, [change, sigma, p_text(one.p_value)]
     return [Text(cell, style) for cell in cells]
 
 
@@ -167,7 +168,7 @@ def words_of(one: "SeriesEntry") -> Content:
         said = "changed more than chance" if one.changed else "no more than chance"
         lines.append(f"since the calibration before: {said} (p {p_text(one.p_value)})")
     if one.drift is None:
-        lines.append("a drift is looked for from three calibrations on")
+        lines.append("a drift is looked for from three calibrations on, over a day or more")
     else:
         sign = "moves" if one.drift.clear else "no drift beyond chance:"
         lines.append(f"{sign} {drift_words(one.drift, one.unit)}".replace("+-", "±"))

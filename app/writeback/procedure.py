@@ -310,7 +310,7 @@ async def undo(station: Station, snapshot: Snapshot, why: str) -> Snapshot:
     except ParameterError as error:
         tell(WriteBackStage("snapshot", f"what it holds cannot be saved: {error.what}"))
     try:
-        tell(WriteBackStage("write", f"set {snapshot.number}"))
+        tell(WriteBackStage("write", f"set {snapshot.number} into volatile memory"))
         wanted = Wanted(snapshot.values, snapshot.own)
         await write_volatile(station, wanted)
         tell(WriteBackStage("store", "into memory that survives a power cycle"))

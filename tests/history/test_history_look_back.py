@@ -38,6 +38,12 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
         journal.done(step.id, 1, float(number), utc, {})
     journal.note("answer", "done", 3.0, "2026-11-29T06:00:03.000+00:00")
     journal.close()
+    calibrated(folder, 30.4375)
+    return folder
+
+
+def calibrated(folder: Path, apart_days: float) -> None:
+    """Five calibrations; leg 3 moves on from each to the next, leg 1 before the last."""
     generator = np.random.default_rng(12)
     begun = datetime(2026, 1, 5, tzinfo=UTC)
     for month in range(5):
@@ -49,9 +55,8 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
             for n, v in values.items()
         ]
         said = {"runs": [f"run{month}"], "effects": [], "rms_um": 6.0, "parameters": parameters}
-        utc = (begun + timedelta(days=30.4375 * month)).isoformat()
+        utc = (begun + timedelta(days=apart_days * month)).isoformat()
         History(folder).add(Entry("fit", utc, "hexapod", "1001", f"run{month}", said))
-    return folder
 
 
 def test_a_session_is_listed_with_how_far_it_came(root: Path) -> None:
@@ -101,6 +106,27 @@ def test_what_changed_more_than_chance_is_named_and_a_drift_has_its_forecast(roo
     assert moving.rate == pytest.approx(0.03, abs=4 * moving.sigma)
     # The machine's file allows 0.3 mm about 230.715.
     assert moving.months == pytest.approx((231.015 - 230.92) / 0.03, abs=1.0)
+
+
+def test_what_an_afternoon_shows_is_called_no_drift(tmp_path: Path) -> None:
+    calibrated(tmp_path, 0.1)
+    (machine,) = history_of(tmp_path).machines
+    assert {one.name: one.drift for one in machine.parameters} == {
+        "leg1.L0": None, "leg3.L0": None,
+    }  # fmt: skip
+    assert {one.name: one.changed for one in machine.parameters}["leg1.L0"]
+
+
+def test_runs_that_are_fitted_together_as_well_are_no_calibration_more(tmp_path: Path) -> None:
+    calibrated(tmp_path, 30.0)
+    alone = history_of(tmp_path)
+    history = History(tmp_path)
+    last = history.entries("fit")[-1]
+    said = {**last.said, "runs": ["run3", "run4"]}
+    history.add(Entry("fit", "2026-08-01T00:00:00+00:00", "hexapod", "1001", "both", said))
+    both = history_of(tmp_path)
+    assert both.machines[0].parameters == alone.machines[0].parameters
+    assert len(both.machines[0].events) == len(alone.machines[0].events) + 1
 
 
 @pytest.mark.parametrize("verb", ["sessions", "log", "history"])

@@ -9,7 +9,7 @@ from textual_hires_canvas.canvas import Canvas
 
 from app.show.spans import duration
 from app.tui.theme import SERIES
-from app.tui.widgets.plots import LogPairPlot, PairPlot, QuietPlot, few_ticks, thin
+from app.tui.widgets.plots import LogPairPlot, PairPlot, QuietPlot, ago, few_ticks, thin
 
 
 def test_thinning_keeps_the_outlier() -> None:
@@ -89,6 +89,14 @@ async def test_a_plot_of_nothing_shows_nothing() -> None:
             plot.show({"all": (np.arange(float(count)), np.ones(count))}, (count, shown))
             await pilot.pause(0.2)
             assert bool(drawn(plot).strip()) is shown
+
+
+@pytest.mark.parametrize(("span", "unit", "times"), [(90.0, "days", 1), (1.0, "hours", 24)])
+def test_times_are_in_the_unit_that_suits_them(span: float, unit: str, times: float) -> None:
+    days = np.array([-span, 0.0])
+    assert ago(days)[0] == unit
+    assert np.allclose(ago(days)[1], times * days)
+    assert ago(days / 1e3)[0] == ("hours" if span > 84 else "minutes")
 
 
 def test_time_spans_in_words() -> None:

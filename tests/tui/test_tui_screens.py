@@ -41,6 +41,7 @@ async def full(pilot: Pilot[Any], folder: Path) -> Workbench:
     desk.course.before, desk.course.after = stream.verified(600.0, 1), stream.verified(5.0, 2)
     desk.corrections.comparison = stream.compared()
     desk.corrections.snapshots = stream.snapshots()
+    desk.corrections.in_use = frozenset({2})
     for gate in stream.compared().gates:
         desk.picture.tell(gate)
     desk.picture.tell(WriteBackStage("write", "54 values into volatile memory"))

@@ -167,11 +167,21 @@ class SeriesPlot(QuietPlot):
         y, sigma = scale * (values - middle), scale * sigmas
         low, high = float(np.min(y - sigma)), float(np.max(y + sigma))
         room = 0.1 * (high - low) or 1.0
+        over, days = ago(days)
         self.set_ylimits(low - room, high + room)
         self.set_xlimits(*around(float(days[0]), float(days[-1])))
         self.errorbar(days, y, yerr=sigma, marker="o", marker_style=self.tint("accent"))
         against = " against the last" if middle else ""
-        self.border_title = f"{name}, {unit}{against}, over days"
+        self.border_title = f"{name}, {unit}{against}, over {over}"
+
+
+def ago(days: Array) -> tuple[str, Array]:
+    """Times (N,) before now in the unit that suits the longest: its name, and the times in it."""
+    span = float(np.ptp(days)) if len(days) else 0.0
+    for name, per_day, least in (("days", 1.0, 2.0), ("hours", 24.0, 2.0 / 24.0)):
+        if span >= least:
+            return name, per_day * days
+    return "minutes", 1440.0 * days
 
 
 class TargetPlot(QuietPlot):
