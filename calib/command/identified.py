@@ -7,11 +7,12 @@ from functools import cached_property
 import numpy as np
 
 from calib.arrays import Array, BoolArray
-from calib.command.rows import rows_with_everything
+from calib.command.rows import empty_run, rows_with_everything
 from calib.effects.component import Effect
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.runs.header import Load
+from calib.runs.record import Run
 from calib.runs.stack import STATES, Rows
 from calib.unknown import linear_among
 
@@ -91,6 +92,21 @@ class Identified:
         for found in self.effects:
             machine = found.effect.closure(machine, found.values)
         return machine
+
+    @cached_property
+    def run(self) -> Run:
+        """A run without a row: effects ask it for the load."""
+        return empty_run(self.load)
+
+    @cached_property
+    def lengths(self) -> tuple[Array, Array]:
+        """What counts as 1 of extensions (n, 1) and of parameters (P, 1): size in mm, or 1 rad."""
+        size = self.machine.size
+        both = (self.machine.actuators, self.machine.parameters)
+        extension, parameters = (
+            np.array([1.0 if one.unit == "rad" else size for one in kind])[:, None] for kind in both
+        )
+        return extension, parameters
 
     @cached_property
     def needs(self) -> tuple[str, ...]:

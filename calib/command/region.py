@@ -107,7 +107,8 @@ class Region:
                 continue
             low, high = known
             spare = _spare(name, low, high)
-            for pose in np.flatnonzero((values < low - spare) | (values > high + spare)):
+            passed = (values < low - spare) | (values > high + spare)
+            for pose in np.flatnonzero(passed) if passed.any() else ():
                 value = float(values[pose])
                 found.append(Excess(int(pose), name, value, low, high, units[name]))
         return sorted(found, key=lambda one: one.pose)

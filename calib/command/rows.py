@@ -15,7 +15,7 @@ from calib.runs.stack import STATES, Rows
 
 def rows_at(
     machine: Machine,
-    load: Load | None,
+    run: Run,
     path: CommandedPath,
     at: IntArray,
     channels: Mapping[str, Array],
@@ -23,13 +23,15 @@ def rows_at(
 ) -> Rows:
     """Rows that stand at places (N,) of a path, read without noise at the platform's origin.
 
+    ``run`` says what the machine carries: :func:`empty_run`.
+
     ``controller`` holds the controller's own parameters, to which its coordinates refer.
     """
     count = at.size
     extension = path.extension[:, at]
     return Rows(
         machine=machine,
-        runs=(_empty_run(load),),
+        runs=(run,),
         run=np.zeros(count, dtype=np.intp),
         line=np.arange(1, count + 1, dtype=np.intp),
         pose_name=tuple(str(k + 1) for k in range(count)),
@@ -56,10 +58,10 @@ def rows_with_everything(effect: Effect, machine: Machine, load: Load | None) ->
     home = machine.extension(np.stack([machine.home_q, machine.home_q + 1e-3], axis=1))
     motion = np.array([axis.motion for axis in machine.axes])
     path = CommandedPath.of_run(home, np.arange(2.0), motion)
-    return rows_at(machine, load, path, np.arange(2, dtype=np.intp), channels)
+    return rows_at(machine, empty_run(load), path, np.arange(2, dtype=np.intp), channels)
 
 
-def _empty_run(load: Load | None) -> Run:
+def empty_run(load: Load | None) -> Run:
     """A run without a row: effects ask it for the load."""
     return Run(
         header=Header(machine="", load=load),

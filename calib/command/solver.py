@@ -18,14 +18,20 @@ import numpy as np
 from calib.arrays import Array, BoolArray, IntArray
 from calib.command.history import History
 from calib.command.identified import Identified
-from calib.command.standing import AGREED, Standpoint, command_rows, one_pass
+from calib.command.standing import (
+    AGREED,
+    Standpoint,
+    command_rows,
+    one_pass,
+    without_effects,
+)
 from calib.command.surroundings import Surroundings
 from calib.errors import BadInput
 from calib.mechanism.configuration import Configuration
 from calib.mechanism.limits import violations
 from calib.mechanism.rigid import Poses
 from calib.mechanism.solve import begun_at, forward, inverse
-from calib.mechanism.task import task_error, task_rows, task_values
+from calib.mechanism.task import FULL, task_error, task_rows, task_values
 
 PATIENCE = 40
 """Passes without one more command of a sequence solved, after which the rest is given up."""
@@ -205,8 +211,13 @@ def _solved(
     extension = np.where(kept, begin, history.extension[:, -1:])
     passes = best = waited = 0
     while True:
-        rows = command_rows(identified, extension, surroundings, history, steps)
-        near = one_pass(identified, rows, near, plain)
+        if identified.effects:
+            rows = command_rows(identified, extension, surroundings, history, steps)
+            near = one_pass(identified, rows, near, plain)
+        else:
+            near = without_effects(
+                identified, extension, surroundings, history, steps, near.closed if near else plain
+            )
         error = _error(identified, goal, near)
         miss = _size(identified, error)
         good = near.agreed & (miss <= AGREED) | ~kept
@@ -246,9 +257,12 @@ def _size(identified: Identified, error: Array) -> Array:
 
 def _towards(identified: Identified, error: Array, near: Standpoint) -> Array:
     """Step (n, N) of the commands that takes the error away by the geometry alone."""
-    T = task_rows(identified.machine.task, near.poses.rotation)
-    slope = np.einsum("tcn,acn->nta", T, near.twists)
-    finite = np.isfinite(slope).all(axis=(1, 2)) & np.isfinite(error).all(axis=0)
+    task = identified.machine.task
+    if task.coordinates == FULL:
+        slope = near.twists.transpose(2, 1, 0)
+    else:
+        slope = np.einsum("tcn,acn->nta", task_rows(task, near.poses.rotation), near.twists)
+    finite = np.asarray(np.isfinite(slope).all(axis=(1, 2)) & np.isfinite(error).all(axis=0))
     slope = np.where(finite[:, None, None], slope, np.eye(*slope.shape[1:]))
     wanted = np.where(finite, error, 0.0)
     if slope.shape[1] == slope.shape[2]:

@@ -6,7 +6,9 @@ agree. What an effect does to the platform itself (``Signature.twist``) comes la
 x -> x + v, R -> exp(omega) R.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -43,8 +45,6 @@ class Standpoint:
         How much the effects changed in the last pass, as a part of the machine's size.
     drift : (n, N)
         How much they changed the extensions in it, mm or rad.
-    situation : Situation
-        What the effects were asked at.
     """
 
     poses: Poses
@@ -52,8 +52,13 @@ class Standpoint:
     extension: Array
     unrest: Array
     drift: Array
-    situation: Situation
     _done: "_Changes"
+    _situated: Callable[[], Situation]
+
+    @cached_property
+    def situation(self) -> Situation:
+        """What the effects were asked at."""
+        return self._situated()
 
     @property
     def agreed(self) -> BoolArray:
@@ -121,7 +126,7 @@ def command_rows(
         )
     path, at = history.path(extension, surroundings.times(count), identified.motion, steps)
     machine, controller = identified.machine, identified.controller
-    return rows_at(machine, identified.load, path, at, channels, controller)
+    return rows_at(machine, identified.run, path, at, channels, controller)
 
 
 def standpoint(
@@ -196,13 +201,44 @@ def one_pass(
     closed = forward(closing, extension, parameters, start)
     situation = _situation(identified, rows, closed, parameters)
     done = _asked(identified, situation)
-    poses = Poses(
-        closed.poses.position + done.twist[:3],
-        product(exponential(done.twist[3:]), closed.poses.rotation),
-    )
+    poses = closed.poses
+    if done.twist.any():
+        turned = product(exponential(done.twist[3:]), poses.rotation)
+        poses = Poses(poses.position + done.twist[:3], turned)
     unrest = _unrest(identified, done, None if near is None else near._done)
     drift = done.extension if near is None else done.extension - near._done.extension
-    return Standpoint(poses, closed, rows.extension, unrest, drift, situation, done)
+    return Standpoint(poses, closed, rows.extension, unrest, drift, done, lambda: situation)
+
+
+def without_effects(
+    identified: Identified,
+    extension: Array,
+    surroundings: Surroundings,
+    history: History,
+    steps: IntArray,
+    start: Configuration,
+) -> Standpoint:
+    """A machine that has no effects: closed once, its derivatives made when they are asked for.
+
+    Raises
+    ------
+    BadInput
+        As :func:`command_rows` does.
+    """
+    count = extension.shape[1]
+    for name in surroundings.channels:
+        surroundings.channel(name, count)
+    if surroundings.time_s is not None:
+        history.path(extension, surroundings.times(count), identified.motion, steps)
+    closed = forward(identified.closing, extension, identified.parameters, start)
+
+    def situated() -> Situation:
+        rows = command_rows(identified, extension, surroundings, history, steps)
+        return _situation(identified, rows, closed, identified.parameters)
+
+    none = np.zeros_like(extension)
+    done = _Changes(none, None, np.zeros((6, count)))
+    return Standpoint(closed.poses, closed, extension, np.zeros(count), none, done, situated)
 
 
 def _situation(
@@ -247,13 +283,12 @@ def _unrest(identified: Identified, now: _Changes, before: _Changes | None) -> A
     machine = identified.machine
     if before is None:
         return np.full(now.twist.shape[1], 0.0 if not identified.effects else np.inf)
-    moved = np.array([1.0 if a.unit == "rad" else machine.size for a in machine.actuators])
+    moved, units = identified.lengths
     parts = [
-        np.abs(now.extension - before.extension) / moved[:, None],
+        np.abs(now.extension - before.extension) / moved,
         np.abs(now.twist[:3] - before.twist[:3]) / machine.size,
         np.abs(now.twist[3:] - before.twist[3:]),
     ]
     if now.parameters is not None and before.parameters is not None:
-        units = np.array([1.0 if p.unit == "rad" else machine.size for p in machine.parameters])
-        parts.append(np.abs(now.parameters - before.parameters) / units[:, None])
+        parts.append(np.abs(now.parameters - before.parameters) / units)
     return np.asarray(np.max(np.concatenate(parts), axis=0))

@@ -42,6 +42,8 @@ class Surroundings:
 
 
 def _spread(value: float | Array, count: int, name: str) -> Array:
+    if isinstance(value, float | int) and np.isfinite(value):
+        return np.full(count, float(value))
     values = np.asarray(value, dtype=np.float64)
     if values.ndim and values.shape != (count,):
         raise BadInput(

@@ -70,8 +70,11 @@ class Trajectory:
     def sent(self, commands: Commands) -> None:
         """Let commands that were only asked for count as sent."""
         identified = self._identified
-        whole = identified.remembers_path
-        self._history = commands.history.condensed(identified.motion, whole_path=whole)
+        history, whole = commands.history, identified.remembers_path
+        if identified.effects:
+            self._history = history.condensed(identified.motion, whole_path=whole)
+        else:  # nothing looks back
+            self._history = History(history.extension[:, -1:], history.time_s[-1:])
         self._last = commands
 
     def blocks(

@@ -209,6 +209,11 @@ class Machine:
         """Actuator limits, shape (n, 2)."""
         return np.array([a.limits for a in self.actuators]).reshape(-1, 2)
 
+    @cached_property
+    def joint_limits(self) -> Array:
+        """Limits of the passive coordinates, shape (n_joints, 2)."""
+        return np.array([joint.limits for joint in self.joints]).reshape(-1, 2)
+
     def index(self, name: str) -> int:
         """Position of a parameter; raises :class:`BadInput` for an unknown name."""
         try:
@@ -232,14 +237,23 @@ class Machine:
 
     def reference(self, controller: Mapping[str, float] | None = None) -> Array:
         """Reference of every actuator, shape (n,), with the controller's own parameter values."""
-        held = controller or {}
+        reference = self._references.copy()
+        for k, a in enumerate(self.actuators if controller else ()):
+            if isinstance(a.reference, str) and controller and a.reference in controller:
+                reference[k] = controller[a.reference]
+        return reference
+
+    @cached_property
+    def _references(self) -> Array:
+        """References by nominal parameters (n,)."""
         return np.array(
             [
-                held.get(a.reference, self.nominal[self.index(a.reference)])
+                self.nominal[self.index(a.reference)]
                 if isinstance(a.reference, str)
                 else a.reference
                 for a in self.actuators
-            ]
+            ],
+            dtype=np.float64,
         )
 
     def extension(self, q: Array, controller: Mapping[str, float] | None = None) -> Array:

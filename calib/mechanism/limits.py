@@ -71,14 +71,17 @@ def violations(
         for i in np.flatnonzero(~configuration.converged)
     ]
     q = machine.coordinates(configuration.extension, controller)
-    names = [a.name for a in machine.actuators]
-    units = [a.unit for a in machine.actuators]
     low, high = _stroke(machine, margin)
-    found += _named(q, low, high, names, units, configuration.converged)
-    names = [f"{limb.name}.{joint.name}" for limb in machine.limbs for joint in limb.joints]
-    units = ["rad" if joint.turns else "mm" for joint in machine.joints]
+    passed = _excess(q, low, high) & configuration.converged
+    if passed.any():
+        names = [a.name for a in machine.actuators]
+        found += _named(passed, q, low, high, names, [a.unit for a in machine.actuators])
     low, high = _joint_limits(machine, margin)
-    found += _named(configuration.passive, low, high, names, units, configuration.converged)
+    passed = _excess(configuration.passive, low, high) & configuration.converged
+    if passed.any():
+        names = [f"{limb.name}.{joint.name}" for limb in machine.limbs for joint in limb.joints]
+        units = ["rad" if joint.turns else "mm" for joint in machine.joints]
+        found += _named(passed, configuration.passive, low, high, names, units)
     return sorted(found, key=lambda v: v.pose)
 
 
@@ -102,16 +105,16 @@ def _stroke(machine: Machine, margin: Margin | None) -> tuple[Array, Array]:
 
 
 def _joint_limits(machine: Machine, margin: Margin | None) -> tuple[Array, Array]:
-    low, high = np.array([joint.limits for joint in machine.joints]).reshape(-1, 2).T
+    low, high = machine.joint_limits.T
     return (low, high) if margin is None else (low + margin.joints, high - margin.joints)
 
 
 def _named(
-    values: Array, low: Array, high: Array, names: list[str], units: list[str], closed: BoolArray
+    passed: BoolArray, values: Array, low: Array, high: Array, names: list[str], units: list[str]
 ) -> list[Violation]:
     return [
         Violation(
             int(pose), names[k], float(values[k, pose]), float(low[k]), float(high[k]), units[k]
         )
-        for k, pose in np.argwhere(_excess(values, low, high) & closed)
+        for k, pose in np.argwhere(passed)
     ]

@@ -86,7 +86,10 @@ class CommandedPath:
     @cached_property
     def step(self) -> Array:
         """Last change of each actuator (n, M) up to a row, with its sign; 0 before the first."""
-        change = self.change
+        change, rows = self.change, np.arange(self.count)
+        if np.array_equal(self.before[self.before >= 0], rows[self.before >= 0] - 1):
+            there = np.where((change != 0.0) | (self.before < 0), rows, 0)
+            return np.take_along_axis(change, np.maximum.accumulate(there, axis=1), axis=1)
         return self.carry(
             np.zeros_like(change),
             lambda last, row: np.where(change[:, row] != 0.0, change[:, row], last),

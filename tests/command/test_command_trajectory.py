@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from command_cases import LOAD, machine_of
+from command_cases import LOAD, machine_of, wanted_of
 
-from calib.command import Identified, Surroundings, Trajectory, commands_for
+from calib.command import Identified, Surroundings, Trajectory, commands_for, standpoint
 from calib.effects import effect_named
 from calib.errors import BadInput
 
@@ -69,3 +69,19 @@ def test_trajectory_says_which_pose_is_refused() -> None:
     assert next(blocks).shape == (6, 50)
     with pytest.raises(BadInput, match="pose 71 of the trajectory: it passes a limit: q1"):
         next(blocks)
+
+
+def test_a_machine_without_effects_is_closed_at_its_commands_as_one_with_effects_is():
+    machine = machine_of("hexapod")
+    bare = Identified(machine, machine.nominal + 0.3 * machine.prior_sigma)
+    wanted = wanted_of("hexapod")
+    found = commands_for(bare, wanted)
+    asked = standpoint(bare, found.extension)
+    assert found.passes == 1
+    here, there = found.standing, asked
+    np.testing.assert_allclose(here.poses.position, there.poses.position, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(here.twists, there.twists, rtol=1e-8, atol=1e-10)
+    with pytest.raises(BadInput, match="times that do not go back"):
+        commands_for(bare, wanted, Surroundings({}, np.arange(wanted.shape[1])[::-1]))
+    with pytest.raises(BadInput, match="payload_kg"):
+        commands_for(bare, wanted, Surroundings({"payload_kg": np.nan}))

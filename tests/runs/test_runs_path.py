@@ -107,3 +107,24 @@ def test_branches_share_their_past_and_not_each_other():
 def test_rows_between_which_nothing_moved_share_a_stop():
     path = joined_paths([walk(0.0, 0.0, 1.0, 1.0, 0.0), walk(0.0, 0.0)])
     assert path.stop.tolist() == [0, 0, 2, 2, 4, 5, 5]
+
+
+def test_last_changes_are_those_that_are_carried_row_by_row() -> None:
+    rng = np.random.default_rng(4)
+    paths = [
+        CommandedPath.of_run(
+            np.cumsum(rng.integers(-1, 2, (3, count)) * rng.integers(0, 2, (3, count)), axis=1)
+            * 0.5,
+            np.arange(float(count)),
+            np.full(3, 1e-6),
+        )
+        for count in (1, 9, 30)
+    ]
+    branched = paths[1].branched(3, paths[2].extension[:, :4], 20.0)
+    for path in (*paths, joined_paths(paths), branched):
+        change = path.change
+
+        def move(last: np.ndarray, row: int, change: np.ndarray = change) -> np.ndarray:
+            return np.where(change[:, row] != 0.0, change[:, row], last)
+
+        assert np.array_equal(path.step, path.carry(np.zeros_like(change), move))
