@@ -9,6 +9,7 @@ import numpy as np
 from app.files.models import chosen_effects, offered_effects
 from app.files.runs import LoadedRun, read_runs
 from calib.effects import Effect, catalogue, effect_named
+from calib.effects.of_one_run import each_alone
 from calib.errors import BadInput
 from calib.look import first_look
 from calib.runs.stack import Rows, stack
@@ -83,16 +84,20 @@ def load_refitter(
     watch: Callable[[tuple[str, ...]], None] | None = None,
     offer: Sequence[Path] = (),
     mask: Sequence[str] = (),
+    each_run: bool = False,
 ) -> "tuple[Refitter, tuple[str, ...]]":
     """Make runs ready for diagnosis: a refitter over the catalogue, and the effects to begin with.
 
     ``offer`` are effect files that are candidates beside the catalogue; ``watch`` is told the
     effects of every model that is looked at; ``mask`` are lines as :func:`masked_rows` takes them.
+    ``each_run``: machine effects are candidates for each run alone as well.
     """
     from calib.discover.discovery import Refitter  # a fit goes without
 
     rows, effects = load_rows(runs, add, model)
-    candidates = (*catalogue(rows.machine), *offered_effects(offer, effects), *effects)
+    shared = catalogue(rows.machine)
+    alone = each_alone(shared, rows) if each_run else ()
+    candidates = (*shared, *alone, *offered_effects(offer, effects), *effects)
     known = {effect.id: effect for effect in candidates}
     masked = masked_rows(rows, mask)
     refit = Refitter(rows, tuple(known.values()), masked=masked, watch=watch)

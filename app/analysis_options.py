@@ -49,6 +49,15 @@ def offers(offer: tuple[Path, ...], site: Path | None) -> tuple[Path, ...]:
     return (*load_site(site).offers, *offer)
 
 
+def each_run_option(function: _Function) -> _Function:
+    """Give a verb ``--each-run``."""
+    return click.option(
+        "--each-run",
+        is_flag=True,
+        help="Of several runs: ask as well whether one run alone has an effect (backlash@2).",
+    )(function)
+
+
 def residuals_option(function: _Function) -> _Function:
     """Give a verb ``--residuals FILE``."""
     return click.option(

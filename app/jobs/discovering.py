@@ -243,6 +243,7 @@ def diagnose(
     model: File | None = None,
     offer: Sequence[File] = (),
     mask: Sequence[int | str] = (),
+    each_run: bool = False,
     watch: Watch | None = None,
 ) -> DiagnosisReport:
     """Score every known effect against what the fit leaves: which one is missing?
@@ -255,6 +256,8 @@ def diagnose(
         Effect files (docs/own-effects.md) that are candidates beside the catalogue.
     mask : sequence of int or str, optional
         As for :func:`fit`.
+    each_run : bool
+        Of several runs: ask of every machine effect as well whether one run alone has it.
     watch : callable, optional
         Told the effects of each model that is fitted.
 
@@ -275,7 +278,7 @@ def diagnose(
     """
     names = names_of(runs)
     refit, begin = load_refitter(
-        names, tuple(add), path_of(model), watch, paths_of(offer), lines_of(mask)
+        names, tuple(add), path_of(model), watch, paths_of(offer), lines_of(mask), each_run
     )
     found = refit(begin).run
     return DiagnosisReport.of(diagnosis_report(found), _fit=found.fit, _runs=names)
@@ -288,6 +291,7 @@ def discover(
     model: File | None = None,
     offer: Sequence[File] = (),
     mask: Sequence[int | str] = (),
+    each_run: bool = False,
     watch: Watch | None = None,
 ) -> DiscoveryReport:
     """Add the best effect, fit again, and go on until nothing more is called for.
@@ -302,6 +306,8 @@ def discover(
         Effect files that are candidates beside the catalogue.
     mask : sequence of int or str, optional
         As for :func:`fit`.
+    each_run : bool
+        Of several runs: ask of every machine effect as well whether one run alone has it.
     watch : callable, optional
         Told the effects of each model that is looked at.
 
@@ -323,7 +329,7 @@ def discover(
     """
     names = names_of(runs)
     refit, begin = load_refitter(
-        names, tuple(add), path_of(model), watch, paths_of(offer), lines_of(mask)
+        names, tuple(add), path_of(model), watch, paths_of(offer), lines_of(mask), each_run
     )
     found = discover_run(refit, asked_for(refit, begin, add))
     remember_fit(stage_of(found).run.fit, names)

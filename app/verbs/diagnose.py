@@ -10,6 +10,7 @@ import click
 
 from app import answer
 from app.analysis_options import (
+    each_run_option,
     mask_option,
     model_options,
     offer_options,
@@ -28,6 +29,7 @@ from calib.digits import plus_minus
 @offer_options
 @residuals_option
 @mask_option
+@each_run_option
 @answer.json_option
 def command(
     runs: tuple[str, ...],
@@ -37,6 +39,7 @@ def command(
     site: Path | None,
     residuals: Path | None,
     mask: tuple[str, ...],
+    each_run: bool,
     as_json: bool,
 ) -> None:
     """Score every known effect against what the model leaves of RUN...
@@ -50,7 +53,13 @@ def command(
     outside_runs(residuals, runs)
     with answer.working("testing every known effect"):
         asked = diagnose(
-            runs, add=add, model=model, offer=offers(offer, site), mask=mask, watch=watcher()
+            runs,
+            add=add,
+            model=model,
+            offer=offers(offer, site),
+            mask=mask,
+            each_run=each_run,
+            watch=watcher(),
         )
     written_residuals(asked, residuals)
     report = asked.to_json()

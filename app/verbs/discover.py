@@ -10,6 +10,7 @@ import click
 
 from app import answer
 from app.analysis_options import (
+    each_run_option,
     mask_option,
     model_options,
     offer_options,
@@ -27,6 +28,7 @@ from app.verbs.diagnose import bad_lines, not_asked, sizes, um
 @model_options
 @offer_options
 @mask_option
+@each_run_option
 @click.option(
     "--save", type=answer.WrittenFile(), help="Write the model with what was found to FILE."
 )
@@ -39,6 +41,7 @@ def command(
     offer: tuple[Path, ...],
     site: Path | None,
     mask: tuple[str, ...],
+    each_run: bool,
     save: Path | None,
     residuals: Path | None,
     as_json: bool,
@@ -54,7 +57,13 @@ def command(
     outside_runs(residuals, runs)
     with answer.working("looking for effects, adding the best, fitting again"):
         found = discover(
-            runs, add=add, model=model, offer=offers(offer, site), mask=mask, watch=watcher()
+            runs,
+            add=add,
+            model=model,
+            offer=offers(offer, site),
+            mask=mask,
+            each_run=each_run,
+            watch=watcher(),
         )
     if save is not None:
         found.save(save)

@@ -5,6 +5,7 @@ from functools import lru_cache
 from importlib import import_module
 
 from calib.effects.component import Effect, Signature, Situation
+from calib.effects.of_one_run import OfOneRun, of_one_run
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.unknown import Unknown
@@ -46,7 +47,17 @@ def is_shipped(identifier: str) -> bool:
 
 
 def effect_named(identifier: str, machine: Machine) -> Effect:
-    """Find an effect; raises BadInput for one that the machine does not have."""
+    """Find an effect, ``backlash``, or ``backlash@2`` for the second of several runs alone.
+
+    Raises BadInput for one that the machine does not have.
+    """
+    if (asked := of_one_run(identifier)) is not None:
+        alone = OfOneRun(effect_named(asked[0], machine), asked[1])
+        if why := alone.lacking(machine):
+            raise BadInput(
+                f"{asked[0]} cannot be of one run: {why}", remedy=f"Name {asked[0]} for all"
+            )
+        return alone
     here = {effect.id: effect for effect in catalogue(machine)}
     if identifier in here:
         return here[identifier]

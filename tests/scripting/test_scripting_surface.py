@@ -24,8 +24,8 @@ SIGNATURES = {
     "every=None, before=None, extrapolate=False",
     "design": "runs, discriminate, n=10, *, add=(), model=None, offer=(), candidates=250, seed=1, "
     "watch=None",
-    "diagnose": "runs, *, add=(), model=None, offer=(), mask=(), watch=None",
-    "discover": "runs, *, add=(), model=None, offer=(), mask=(), watch=None",
+    "diagnose": "runs, *, add=(), model=None, offer=(), mask=(), each_run=False, watch=None",
+    "discover": "runs, *, add=(), model=None, offer=(), mask=(), each_run=False, watch=None",
     "export": "model, form, *, machine=None",
     "fit_fleet": ("folders, *, add=(), out=None, workers=None, scheduler='', watch=None"),
     "fit": "runs, *, add=(), model=None, mask=()",
