@@ -88,7 +88,7 @@ class Situation:
 
     def twists_of(self, parameters: IntArray) -> Array:
         """Derivative (k, 6, N) of the platform's twist by some parameters, base axes."""
-        return np.asarray(self.state_twists[parameters][:, :, self.state_of])
+        return np.take(self.state_twists[parameters], self.state_of, axis=2)
 
     @cached_property
     def position(self) -> Array:

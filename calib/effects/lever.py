@@ -3,20 +3,20 @@
 import numpy as np
 
 from calib.arrays import Array, BoolArray
-from calib.mechanism.rigid import cross
 
 
 def whitened_frame(whitener: Array, turn: Array) -> Array:
     """Whitener times frame rotation, (3, 3, N)."""
-    return np.stack([apply(whitener, turn[:, j]) for j in range(3)], axis=1)
+    return np.asarray(np.einsum("ijn,jkn->ikn", whitener, turn))
 
 
 def lever_of(combined: Array, arm: Array, on_platform: BoolArray) -> Array:
     """Matrix (3, 6, N) from the platform's twist to the whitened reading; zero for base nests."""
     lever = np.empty((3, 6, arm.shape[1]))
     lever[:, :3] = combined
-    for axis in range(3):
-        lever[:, 3 + axis] = apply(combined, cross(np.eye(3)[axis][:, None], arm))
+    for axis in range(3):  # combined (e x arm) for e along each axis
+        one, other = (axis + 1) % 3, (axis + 2) % 3
+        lever[:, 3 + axis] = combined[:, other] * arm[one] - combined[:, one] * arm[other]
     lever *= on_platform
     return lever
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray, IntArray
 from calib.effects.component import Effect, Signature, Situation
-from calib.effects.lever import apply, apply_each, through
+from calib.effects.lever import apply, lever_of, through
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
@@ -158,8 +158,12 @@ class Model:
         depends = dict.fromkeys(name for e in self.effects for name in e.depends)
         columns = [self.rows.column(n) for n in depends if self.rows.has(n)]
         key = np.nan_to_num(np.concatenate([self.rows.extension, *columns]))
-        _, first, inverse = np.unique(key, axis=1, return_index=True, return_inverse=True)
-        return first, inverse.reshape(-1)
+        order = np.lexsort(key[::-1])  # the first row counts most; of equal ones the first is first
+        ahead = key[:, order]
+        new = np.append(True, np.any(ahead[:, 1:] != ahead[:, :-1], axis=0))[: order.size]
+        inverse = np.empty(order.size, dtype=np.intp)
+        inverse[order] = np.cumsum(new) - 1
+        return order[new], inverse
 
     @cached_property
     def nominal_configuration(self) -> Configuration:
@@ -381,11 +385,8 @@ class Model:
 
     def _frame_columns(self, turned: Array, situation: Situation) -> list[Array]:
         rows = self.rows
-        motions = np.zeros((6, *turned.shape))
-        for axis in range(3):
-            motions[axis, axis] = 1.0
-            motions[3 + axis] = cross(np.eye(3)[axis][:, None], turned)
-        whitened = apply_each(situation.whitener, motions)
+        everywhere = np.ones(rows.count, dtype=bool)
+        whitened = lever_of(situation.whitener, turned, everywhere).transpose(1, 0, 2)
         if situation.turner is not None:
             whitened[3:] += np.moveaxis(situation.turner, 1, 0)
         whitened = rows.folded(whitened)
