@@ -261,10 +261,13 @@ def fit(
     bad += gross
     accepted = allowed.copy()
     accepted[[reading.row for reading in bad]] = False
-    steps = 0
+    # Where it begins is handed over: its derivatives are let go with the first step.
+    begun, steps = [linear], 0
+    del linear
     for _ in range(3):
-        optimum = optimise(model, linear, accepted)
+        optimum = optimise(model, begun.pop(), accepted)
         linear, steps = optimum.linear, steps + optimum.steps
+        begun.append(linear)
         found = strays(
             linear.whitened, linear.jacobian, 1.0 / model.prior**2, accepted, model.rows.components
         )

@@ -40,6 +40,9 @@ hundredth of the uncertainty that such a misfit leaves is near enough.
 TOLERANCE = 1e-6
 """Steps end when the predicted fall of chi-square is below this, or below 1e-9 of it."""
 
+AT_ONCE = 10_000
+"""Readings whose derivatives are laid out at once."""
+
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
@@ -150,8 +153,17 @@ class _Readings:
         return float(np.sum(self.white(linear.whitened) ** 2) + np.sum(prior))
 
     def normal_equations(self, linear: Linearised) -> tuple[Scaled, Array]:
-        """Normal matrix and slope (p,)."""
-        flat = self.white(linear.jacobian)
-        slope = flat @ self.white(linear.whitened)
-        slope -= self.precision * self.model.deviation(linear.state)
-        return Scaled.of(normal_matrix(flat, self.precision)), slope
+        """Normal matrix and slope (p,), of a part of the readings at a time where they are many."""
+        pull = self.precision * self.model.deviation(linear.state)
+        if self.whitening is not None or self.accepted.size <= AT_ONCE:
+            flat = self.white(linear.jacobian)
+            slope = flat @ self.white(linear.whitened) - pull
+            return Scaled.of(normal_matrix(flat, self.precision)), slope
+        normal, slope = np.diag(self.precision), -pull
+        kept = np.flatnonzero(self.accepted)
+        for first in range(0, kept.size, AT_ONCE):
+            part = kept[first : first + AT_ONCE]
+            flat = linear.jacobian[:, :, part].reshape(pull.size, -1)
+            normal += flat @ flat.T
+            slope += flat @ linear.whitened[:, part].reshape(-1)
+        return Scaled.of(normal), slope

@@ -175,10 +175,10 @@ def slack_of(model: Model, linear: Linearised) -> Array:
     Six sigmas of what the tolerances can do, the alignment's share included, plus a millimetre
     for effects that nobody has modelled.
     """
-    count = model.free.size
-    moved = model.rows.in_mm(linear.jacobian[:count])
-    moved *= model.machine.prior_sigma[model.free][:, None, None]
-    spread = np.sqrt(np.sum(moved**2, axis=(0, 1)))
+    spread = np.zeros(model.rows.count)
+    for column, sigma in zip(linear.jacobian, model.machine.prior_sigma[model.free], strict=False):
+        spread += np.sum((sigma * model.rows.in_mm(column)) ** 2, axis=0)
+    spread = np.sqrt(spread)
     variances = np.einsum("iin->in", model.rows.covariance)
     noise = np.sqrt(np.sum(np.where(model.rows.in_millimetres, variances, 0.0), axis=0))
     return np.asarray(1.0 + 6.0 * (np.maximum(spread, np.median(spread)) + noise))

@@ -90,6 +90,10 @@ def from_nominal(machine: Machine, runs: Sequence[Run]) -> Fit | None:
     return with_the_excluded(begun)
 
 
+AT_ONCE = 4000
+"""Readings whose columns are multiplied with the Jacobian at once."""
+
+
 @dataclass(frozen=True, eq=False)
 class Scan:
     """Fall of chi-square (M,) if columns act from each accepted reading on, and their sizes."""
@@ -100,24 +104,36 @@ class Scan:
 
 def scan(fitted: Fit, columns: Array, *, early: bool = False) -> Scan:
     """Let columns (k, 3, A) act from reading m on (early: up to it), for every m of A accepted."""
-    jacobian = fitted.linear.jacobian[:, :, fitted.accepted]
-    residual = fitted.linear.whitened[:, fitted.accepted]
-    weights = np.einsum("kin,lin->nkl", columns, columns)
-    scores = np.einsum("kin,in->nk", columns, residual)
-    mixed = np.einsum("pin,kin->npk", jacobian, columns)
-    weights, scores, mixed = (_summed(one, early=early) for one in (weights, scores, mixed))
-    taken = np.einsum("npk,pq,nql->nkl", mixed, fitted.step_covariance, mixed, optimize=True)
-    weights = weights - taken
-    size = np.sqrt(np.maximum(np.einsum("nkk->nk", weights), 1e-300))
-    scaled = weights / size[:, :, None] / size[:, None, :] + 1e-6 * np.eye(columns.shape[0])
-    beta = np.linalg.solve(scaled, (scores / size)[:, :, None])[:, :, 0]
-    return Scan(np.sum(beta * scores / size, axis=1), beta / size)
+    kept, k = np.flatnonzero(fitted.accepted), columns.shape[0]
+    fall, sizes = np.empty(kept.size), np.empty((kept.size, k))
+    unknowns = fitted.linear.jacobian.shape[0]
+    sums = [np.zeros((k, k)), np.zeros(k), np.zeros((unknowns, k))]
+    starts = range(0, kept.size, AT_ONCE)
+    for start in starts if early else reversed(starts):
+        part = slice(start, min(start + AT_ONCE, kept.size))
+        own, here = columns[:, :, part], kept[part]
+        ways = [
+            np.einsum("kin,lin->nkl", own, own),
+            np.einsum("kin,in->nk", own, fitted.linear.whitened[:, here]),
+            np.einsum("pin,kin->npk", fitted.linear.jacobian[:, :, here], own),
+        ]
+        for way, before in zip(ways, sums, strict=True):
+            _sum_up(way, before, early=early)
+        sums = [way[-1 if early else 0].copy() for way in ways]
+        weights, scores, mixed = ways
+        weights -= np.einsum("npk,pq,nql->nkl", mixed, fitted.step_covariance, mixed, optimize=True)
+        size = np.sqrt(np.maximum(np.einsum("nkk->nk", weights), 1e-300))
+        scaled = weights / size[:, :, None] / size[:, None, :] + 1e-6 * np.eye(k)
+        beta = np.linalg.solve(scaled, (scores / size)[:, :, None])[:, :, 0]
+        fall[part], sizes[part] = np.sum(beta * scores / size, axis=1), beta / size
+    return Scan(fall, sizes)
 
 
-def _summed(values: Array, *, early: bool) -> Array:
-    if early:
-        return np.asarray(np.cumsum(values, axis=0))
-    return np.asarray(np.cumsum(values[::-1], axis=0)[::-1])
+def _sum_up(values: Array, before: Array, *, early: bool) -> None:
+    """Make values (n, ...) the sums up to each (early) or from each on, and of those ``before``."""
+    way = values if early else values[::-1]
+    way[0] += before
+    np.cumsum(way, axis=0, out=way)
 
 
 def whitened(fitted: Fit, motions: Array) -> Array:

@@ -13,7 +13,7 @@ frame (dt in mm, then a rotation vector dw in rad about the tracker's axes, R <-
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from calib.mechanism.solve import Configuration, begun_at, forward, home_configu
 from calib.model.columns import at_trial, change_of, channels_known, whitened_columns
 from calib.model.observing import Observed, observe
 from calib.model.setup import SetupUnknowns
-from calib.model.state import Linearised, State
+from calib.model.state import Derivatives, Linearised, State
 from calib.runs.stack import Rows
 from calib.unknown import Unknown, linear_among
 
@@ -232,7 +232,8 @@ class Model:
             whitened = apply(rows.whitener, residual)
         else:
             residual, whitened = seen.misfit(rows.position)
-        return Linearised(now, residual, whitened, self._jacobian(now, signatures, turned))
+        derivatives = Derivatives(partial(self._jacobian, now, signatures, turned))
+        return Linearised(now, residual, whitened, derivatives)
 
     def _jacobian(
         self, state: State, signatures: list[tuple[Array, Signature]], turned: Array

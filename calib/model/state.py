@@ -1,6 +1,8 @@
 """Values of a model's unknowns, and the model near them."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -37,18 +39,40 @@ class State:
         return self.near.closed if isinstance(self.near, Situation) else self.near
 
 
+class Derivatives:
+    """Whitened derivatives (p, 3, N) of a prediction: by far the largest array, made when asked.
+
+    A step that is only tried asks for its residuals alone.
+    """
+
+    def __init__(self, make: Callable[[], Array]) -> None:
+        self._make: Callable[[], Array] | None = make
+
+    @cached_property
+    def value(self) -> Array:
+        """The derivatives; what they are made of is let go."""
+        assert self._make is not None
+        made, self._make = self._make(), None
+        return made
+
+
 @dataclass(frozen=True, eq=False)
 class Linearised:
     """The model near a state.
 
     ``residual`` (3, N) is measured minus predicted, mm, tracker frame; ``whitened`` (3, N) the
-    same in sigmas; ``jacobian`` (p, 3, N) the whitened derivative of the prediction.
+    same in sigmas.
     """
 
     state: State
     residual: Array
     whitened: Array
-    jacobian: Array
+    derivatives: Derivatives
+
+    @property
+    def jacobian(self) -> Array:
+        """Whitened derivatives (p, 3, N) of the prediction by all unknowns."""
+        return self.derivatives.value
 
     @property
     def situation(self) -> Situation:
