@@ -17,6 +17,8 @@ from typing import Any
 from textual.pilot import Pilot
 from textual.widgets import Input
 
+from app.files.site import Site, site_of_mock
+from app.tui import mock_process
 from app.tui.dialogs import Ask
 from app.tui.program import Workbench
 
@@ -24,6 +26,12 @@ HERE = Path(__file__).parent
 MYSTERY = HERE.parent.parent / "tests" / "data" / "runs" / "mystery"
 SIZE = (120, 38)
 MOCK = "hexapod --seed 7 --scale 150 --smrs 3"
+
+
+def patient(announcement: dict[str, Any]) -> Site:
+    """The site of a mock whose drives bear a PC that is busy with other things."""
+    announcement["site"]["controller"]["silence_s"] = 10.0
+    return site_of_mock(announcement)
 
 
 class Photographer:
@@ -158,6 +166,7 @@ PARTS = {"job": job, "analysis": discover, "auto": automatic}
 
 async def main(parts: list[str]) -> None:
     """Take the pictures of some parts, in a folder of its own."""
+    mock_process.site_of_mock = patient  # type: ignore[assignment]
     with tempfile.TemporaryDirectory() as folder:
         os.environ["PKMCAL_STATE"] = str(Path(folder) / "state")
         bench = Workbench(root=Path(folder) / "sessions")
