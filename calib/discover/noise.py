@@ -70,16 +70,29 @@ def _beside(
 ) -> tuple[tuple[Joined, ...], Found]:
     """Those of the effects called for that say more than noise would, and the noise beside them.
 
-    In the order of their evidence: one stays where its evidence is more than what its going lets
-    noise explain. Slow noise is so not taken for a drift, nor a drift for slow noise.
+    In the order of their evidence: one stays where the readings are likelier with it, and the noise
+    that it leaves, than with the noise alone that they demand without it. Slow noise is so not
+    taken for a drift, nor a drift for slow noise.
     """
     kept: tuple[Joined, ...] = ()
     found = estimate(problem, taking)
     for one in joined:
-        beside = estimate(_enlarged(problem, (*kept, one)), taking)
-        if one.log_evidence + _worth(beside) > _worth(found):
-            kept, found = (*kept, one), beside
+        larger = _enlarged(problem, (one,))
+        beside = estimate(larger, taking)
+        if _likelier(problem, larger) + _worth(beside) > _worth(found):
+            kept, found, problem = (*kept, one), beside, larger
     return kept, found
+
+
+def _likelier(problem: LinearProblem, larger: LinearProblem) -> float:
+    """Rise of the log likelihood by columns, less half the log of the readings for each.
+
+    With white noise as stated, against which gains of noise are counted, too: evidence, which
+    allows for readings that scatter more, is another currency (Schwarz 1978).
+    """
+    columns = larger.jacobian.shape[0] - problem.jacobian.shape[0]
+    before, after = float(np.sum(problem.residual**2)), float(np.sum(larger.residual**2))
+    return 0.5 * (before - after - columns * float(np.log(problem.residual.size)))
 
 
 def _worth(found: Found) -> float:
