@@ -79,7 +79,8 @@ def _beside(
     for one in joined:
         larger = _enlarged(problem, (one,))
         beside = estimate(larger, taking)
-        if _likelier(problem, larger) + _worth(beside) > _worth(found):
+        told = max(one.log_evidence, _likelier(problem, larger))
+        if told + _worth(beside) > _worth(found):
             kept, found, problem = (*kept, one), beside, larger
     return kept, found
 
@@ -87,12 +88,14 @@ def _beside(
 def _likelier(problem: LinearProblem, larger: LinearProblem) -> float:
     """Rise of the log likelihood by columns, less half the log of the readings for each.
 
-    With white noise as stated, against which gains of noise are counted, too: evidence, which
-    allows for readings that scatter more, is another currency (Schwarz 1978).
+    A floor of the evidence (Schwarz 1978) in the currency in which noise is counted: white noise as
+    stated. Evidence allows for readings that scatter more, and so says less of a first effect
+    where another is missing as well.
     """
     columns = larger.jacobian.shape[0] - problem.jacobian.shape[0]
     before, after = float(np.sum(problem.residual**2)), float(np.sum(larger.residual**2))
-    return 0.5 * (before - after - columns * float(np.log(problem.residual.size)))
+    price: float = columns * float(np.log(problem.residual.size))
+    return 0.5 * (before - after - price)
 
 
 def _worth(found: Found) -> float:
