@@ -54,7 +54,7 @@ class Proxy:
 
     def _pass(self, source: socket.socket, sink: socket.socket) -> None:
         held = b""
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError, ValueError):  # ValueError: closed while it is looked at
             while data := source.recv(4096):
                 fault = self._drawn()
                 if fault == "merge" and not held and select.select([source], [], [], HELD_S)[0]:
