@@ -1,9 +1,9 @@
 """A day of measuring on the scaled clock: does memory stay flat, and is the list of sessions fast?
 
-    python -m bench soak [--hours 24] [--scale 3000] [--page]
+    python -m bench soak [--hours 24] [--readings 10000] [--scale 3000] [--page]
 
 One process measures the same poses again and again on a mock hexapod until its clock has gone so
-far, keeps every session in one folder, and looks at its own memory after each. Then the folder is
+far and there are so many readings, keeps every session in one folder, and looks at its own memory after each. Then the folder is
 filled up to 200 sessions by copies, and listed.
 """
 
@@ -75,6 +75,7 @@ def listed(root: Path) -> tuple[int, float]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=float, default=24.0)
+    parser.add_argument("--readings", type=int, default=10_000)
     parser.add_argument("--scale", type=float, default=3000.0)
     parser.add_argument("--seconds", type=float, default=320.0)
     parser.add_argument("--page", action="store_true")
@@ -86,22 +87,26 @@ def main() -> int:
         os.environ["PKMCAL_STATE"] = str(Path(name) / "state")
         with mock_station("hexapod", 1, options.scale, Path(name)) as file:
             site = load_site(file)
-            while hours < options.hours and time.monotonic() - begun < options.seconds:
+            until = begun + options.seconds
+            while (
+                hours < options.hours or readings < options.readings
+            ) and time.monotonic() < until:
                 folder, count = asyncio.run(one(site, root))
                 hours, readings = hours + _machine_hours(folder), readings + count
                 memory.append(_resident_mb())
                 size_kb = (folder / "journal.sqlite").stat().st_size / 1024 / max(count, 1)
         count, seconds = listed(root)
     settled = memory[WARM:] or memory
-    growth = settled[-1] / settled[0]
+    growth = max(settled) / settled[0]
     says = (
-        f"memory {settled[0]:.0f} to {settled[-1]:.0f} MB, journal {size_kb:.1f} kB a reading; "
+        f"memory {settled[0]:.0f} to {settled[-1]:.0f} MB (at most {max(settled):.0f}), journal {size_kb:.1f} kB a reading; "
         f"{count} sessions listed in {seconds:.2f} s of processor time"
     )
     ran = f"{hours:.1f} machine hours, {readings} readings in {len(memory)} sessions"
     print(f"{ran}: {says}")
+    command = f"soak --hours {options.hours:g} --readings {options.readings}"
     if options.page:
-        write_row("soak", Row(f"soak --hours {options.hours:g}", ran, says))
+        write_row("soak", Row(command, ran, says))
     return 1 if growth > GROWTH or seconds > LISTED_S else 0
 
 
