@@ -3,8 +3,8 @@
     python -m bench soak [--hours 24] [--readings 10000] [--scale 3000] [--page]
 
 One process measures the same poses again and again on a mock hexapod until its clock has gone so
-far and there are so many readings, keeps every session in one folder, and looks at its own memory after each. Then the folder is
-filled up to 200 sessions by copies, and listed.
+far and there are so many readings, keeps every session in one folder, and looks at its own memory
+after each. Then the folder is filled up to 200 sessions by copies, and listed.
 """
 
 import argparse
@@ -99,7 +99,8 @@ def main() -> int:
     settled = memory[WARM:] or memory
     growth = max(settled) / settled[0]
     says = (
-        f"memory {settled[0]:.0f} to {settled[-1]:.0f} MB (at most {max(settled):.0f}), journal {size_kb:.1f} kB a reading; "
+        f"memory {settled[0]:.0f} to {settled[-1]:.0f} MB (at most {max(settled):.0f}), "
+        f"journal {size_kb:.1f} kB a reading; "
         f"{count} sessions listed in {seconds:.2f} s of processor time"
     )
     ran = f"{hours:.1f} machine hours, {readings} readings in {len(memory)} sessions"
