@@ -10,7 +10,7 @@ answer or with a :class:`drivers.errors.DeviceError`. Deadlines run on wall time
 
 from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 
 @dataclass(frozen=True)
@@ -108,6 +108,21 @@ class Moving(Protocol):
 
     async def close(self) -> None:
         """Release the link; never raises."""
+
+
+@runtime_checkable
+class StopsAtOnce(Protocol):
+    """A controller whose stop needs no event loop; what moves a machine may be one.
+
+    The stop key is heard in a thread of its own: while a picture is drawn or a fit takes the
+    processor the event loop comes to its turn late.
+    """
+
+    def stop_at_once(self) -> None:
+        """Send a quick stop from any thread and wait for nothing; never raises.
+
+        :meth:`Moving.stop` follows, and tells what came of it.
+        """
 
 
 class Motors(Moving, Protocol):

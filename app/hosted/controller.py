@@ -15,7 +15,7 @@ from calib.arrays import Array
 from calib.mechanism.description import Machine
 from calib.runs.header import Load
 from drivers.errors import ParameterError, Refused
-from drivers.interface import ActuatorState, Alarm, ControllerCan, ControllerState
+from drivers.interface import ActuatorState, Alarm, ControllerCan, ControllerState, StopsAtOnce
 from drivers.operator.motors import Ask, PersonMoves
 
 SHORT_OF_TARGET = 0.02
@@ -183,6 +183,12 @@ class HostedController:
         if self.by_hand:
             self._commander.sent(tuple(one.position for one in (await self.state()).actuators))
         self._commander.arrived()
+
+    def stop_at_once(self) -> None:
+        """Quick stop from any thread, where the device can; never raises."""
+        device = self._means.device
+        if isinstance(device, StopsAtOnce):
+            device.stop_at_once()
 
     async def stop(self) -> None:
         """Quick stop."""

@@ -199,6 +199,11 @@ class Session:
         self._skip_why = why
         self._step_task.cancel()
 
+    def stop_at_once(self) -> None:
+        """Send the stop of the motion from any thread; :meth:`stop` must follow."""
+        self._stopping = True  # what the engine now hears of the motion is no fault
+        self.station.stop_at_once()
+
     async def stop(self) -> None:
         """Stop everything now: motion first. :meth:`run` ends with StoppedByOperator."""
         self._stopping = True

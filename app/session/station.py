@@ -18,7 +18,7 @@ from app.session.events import (
 from app.session.hands import Carrier, carrier_of
 from app.session.links import open_controller, open_gauge, open_tracker
 from drivers.errors import ConnectFailed, DeviceError
-from drivers.interface import Alarm, Gauge, Identity, MotionController, Tracker
+from drivers.interface import Alarm, Gauge, Identity, MotionController, StopsAtOnce, Tracker
 
 STOP_DEADLINE_S = 3.0
 _State = TypeVar("_State")
@@ -200,6 +200,12 @@ class Station:
         except DeviceError as error:
             self._alarm(Alarm(role, error.what, error.remedy, fault=True))
             return None
+
+    def stop_at_once(self) -> None:
+        """Send a stop from any thread, where the controller can; :meth:`safe_stop` follows."""
+        devices = self._devices
+        if devices is not None and isinstance(devices.controller, StopsAtOnce):
+            devices.controller.stop_at_once()
 
     async def safe_stop(self) -> bool:
         """Stop all motion and any measurement; never raises. Returns whether both confirmed."""

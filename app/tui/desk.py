@@ -269,6 +269,13 @@ class Desk:
         else:
             self._running_session().answer_prompt(prompt, choice)
 
+    def stop_at_once(self) -> None:
+        """Send the stop of whatever moves from any thread; :meth:`stop` follows."""
+        if self.busy and self.session is not None:
+            self.session.stop_at_once()
+        elif self.station is not None:
+            self.station.stop_at_once()
+
     async def stop(self) -> str:
         """Stop whatever moves, at any moment. Returns what was done, in words."""
         flight = self.automatic.running

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich.console import RenderableType
@@ -56,6 +56,11 @@ class Painted(App[ReturnT]):
 
         self._patient.on_taken = taken
         self.app_resume_signal.subscribe(self, lambda _: self._paint_anew(), immediate=True)
+
+    def at_once(self, key: str, act: Callable[[], None]) -> None:
+        """Let a key act in a thread, too, as soon as it is read; where the terminal is ours."""
+        if self._patient is not None:
+            self._patient.at_once[key] = act
 
     def _on_taken(self) -> None:
         if self._patient is None or self._patient.busy:

@@ -97,6 +97,7 @@ class Workbench(Painted[None]):
     def on_mount(self) -> None:
         """Open the site that the command line named, and begin to watch."""
         self.start_painting()
+        self.at_once(STOP_KEY, self.desk.stop_at_once)
         self.register_theme(BENCH)
         kept = kept_theme()
         self.theme = kept if kept in self.available_themes else BENCH.name

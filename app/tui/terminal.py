@@ -9,11 +9,14 @@ meanwhile goes with the next one (:mod:`app.tui.painting`).
 import io
 import os
 import sys
+import threading
 import time
 from collections.abc import Callable
 from typing import IO, Any, cast
 
 from textual.drivers.linux_driver import LinuxDriver
+from textual.events import Key
+from textual.message import Message
 
 from app.tui.signs import in_ascii, only_ascii
 
@@ -39,6 +42,15 @@ class PatientDriver(LinuxDriver):
         self.on_taken: Callable[[], None] | None = None
         """Called in the writer's thread when the terminal has taken everything; nothing is held
         back before it is set."""
+
+        self.at_once: dict[str, Callable[[], None]] = {}
+        """What keys do in the thread that reads them, before the event loop hears of them."""
+
+    def process_message(self, message: Message) -> None:
+        """Let a key that waits for nothing work; then tell the program of it, as of any other."""
+        if isinstance(message, Key) and (act := self.at_once.get(message.key)) is not None:
+            threading.Thread(target=act, name=f"at once {message.key}", daemon=True).start()
+        super().process_message(message)
 
     @property
     def busy(self) -> bool:

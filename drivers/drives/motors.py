@@ -306,6 +306,10 @@ class DriveMotors:
         if self._travel is not None:
             await self._travel.wait(timeout)
 
+    def stop_at_once(self) -> None:
+        """Quick stop from any thread, without waiting for rest; never raises."""
+        self._bus.stop_at_once()
+
     async def stop(self) -> None:
         """Quick stop, at any moment and from any state; never raises for a second call.
 

@@ -240,6 +240,10 @@ class GcsController:
         """
         await self._motion.arrived(timeout)
 
+    def stop_at_once(self) -> None:
+        """Stop all motion (#24) from any thread, without waiting for rest; never raises."""
+        self._link.stop_at_once()
+
     async def stop(self) -> None:
         """Stop all motion (#24), at any moment; never raises for a second call.
 

@@ -164,6 +164,11 @@ class GcsLink:
         if fault is not None:
             raise fault
 
+    def stop_at_once(self) -> None:
+        """Send the stop from any thread, past everything that waits; never raises."""
+        with contextlib.suppress(DeviceError):
+            self.line.stop()
+
     async def close(self) -> None:
         """Release the port; never raises."""
         if self.closed:

@@ -3,6 +3,8 @@
 import asyncio
 import shutil
 import socket
+import threading
+import time
 
 import can
 import pytest
@@ -138,6 +140,21 @@ async def test_quick_stop_in_the_middle_of_everything(station, slow):
     with pytest.raises(DeviceFault):
         await working[0]
     await working[1]
+
+
+async def test_a_stop_from_another_thread_needs_no_event_loop(station, slow):
+    await slow.move_to_pose(HIGH)
+    await until(lambda: station.moving)
+    threading.Thread(target=slow.stop_at_once).start()
+    deadline = time.monotonic() + 20.0
+    while station.moving:  # the event loop does not come to its turn meanwhile
+        assert time.monotonic() < deadline
+        time.sleep(0.005)  # noqa: ASYNC251
+    with pytest.raises(DeviceFault, match="stopped before it reached"):
+        await slow.wait_arrived(20.0)
+    await slow.stop()
+    await slow.close()
+    slow.stop_at_once()  # nothing is there any more, and nothing is raised
 
 
 async def test_jammed_leg_ends_a_jog(station, enabled):

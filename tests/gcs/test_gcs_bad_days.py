@@ -176,6 +176,21 @@ async def test_machine_stops_when_the_pc_is_gone(bench: Bench, controller: GcsCo
     await held
 
 
+async def test_a_stop_from_another_thread_needs_no_event_loop(
+    bench: Bench, controller: GcsController
+):
+    await bench.slow_move()
+    threading.Thread(target=controller.stop_at_once).start()
+    deadline = time.monotonic() + 20.0
+    while bench.world.moving:  # the event loop does not come to its turn meanwhile
+        assert time.monotonic() < deadline
+        time.sleep(0.005)  # noqa: ASYNC251
+    with pytest.raises(DeviceFault, match="stopped"):
+        await controller.wait_arrived(20.0)
+    await controller.close()
+    controller.stop_at_once()  # nothing is there any more, and nothing is raised
+
+
 async def test_closing_lets_go_of_the_machine(bench: Bench, controller: GcsController):
     await bench.slow_move()
     await controller.close()
