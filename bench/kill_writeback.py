@@ -33,9 +33,13 @@ from mocks.control import ControlClient
 LOOSE = ("tolerance", "chi2", "holdout", "condition", "uncertainty", "gain", "check-peak",
          "check-rms")  # fmt: skip
 """Gates that a set off the truth does not pass, which is not what is asked here."""
-STAGES = ("write", "read-back", "store", "reload", "set ")
+STAGES = {
+    "apply": ("write", "read-back", "store", "reload"),
+    "undo": ("snapshot", "write", "store"),
+}
+"""What the program says on its way, where a kill is worth most."""
 LONGEST_S = {"apply": 12.0, "undo": 3.0}
-AFTER_STAGE_S = 0.4
+AFTER_STAGE_S, MOST_TRIES = 0.4, 50
 
 
 def fit_text(off_mm: float) -> str:
@@ -96,6 +100,7 @@ class Killer:
     sets: set[str] = field(default_factory=set)
     """Checksums of the two sets."""
     noticed: int = 0
+    mixed: int = 0
 
     def ask(self) -> dict[str, object]:
         """Which set the mock holds, and with which it was moved."""
@@ -137,7 +142,7 @@ class Killer:
         """Wait for the moment of the kill; False where the program came to its end before."""
         longest = self.dice.uniform(0.3, LONGEST_S[self.of])
         if self.dice.random() < 0.5:
-            ear.hears(self.dice.choice(STAGES), time.monotonic() + ALONE_S)
+            ear.hears(self.dice.choice(STAGES[self.of]), time.monotonic() + ALONE_S)
             longest = self.dice.uniform(0.0, AFTER_STAGE_S)
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(longest)
@@ -157,11 +162,26 @@ class Killer:
     def back(self, number: int) -> None:
         """Undo until it comes through."""
         words = ["undo", "--site", "site.toml", "--to", str(number)]
-        tries = 0
-        while self.run(words, self.of == "undo")[0] != 0:
-            tries += 1
-            if tries > 50:
-                raise SystemExit("UNDO NEVER COMES THROUGH")
+        for _ in range(MOST_TRIES):
+            code, _ = self.run(words, self.of == "undo")
+            if code == 0:
+                return
+            if code is None:
+                self.look()
+        raise SystemExit("UNDO NEVER COMES THROUGH")
+
+    def look(self) -> None:
+        """After a kill the program knows the set that the controller holds, or refuses."""
+        words = ["apply", "b.json", "--site", "site.toml", "--dry-run"]
+        code, said = self.run([*words, "--limit", "tolerance=1e9"], False)
+        whole = str(self.ask()["holds"]) in self.sets
+        self.mixed += not whole
+        if code == 3 and "pkmcal undo" in said:
+            self.noticed += 1
+        elif code == 3 or not whole:
+            raise SystemExit(
+                f"exit code {code}, the set is {'whole' if whole else 'A MIX'}: {said}"
+            )
 
     def apply(self, fit: str, killed: bool) -> None:
         """Apply until the controller holds it; where the program refuses, undo first."""
@@ -177,22 +197,6 @@ class Killer:
             if code == 3 and "pkmcal undo" in said:
                 self.noticed += 1
                 self.back(1)
-
-    def undo(self, number: int) -> None:
-        """Bring a set back, killed on the way: the program then knows the set, or refuses."""
-        code, _ = self.run(["undo", "--site", "site.toml", "--to", str(number)], True)
-        look = ["apply", "b.json", "--site", "site.toml", "--dry-run"]
-        seen, said = self.run([*look, "--limit", "tolerance=1e9"], False)
-        whole = str(self.ask()["holds"]) in self.sets
-        if seen == 3:
-            if "pkmcal undo" not in said:
-                raise SystemExit(f"the way back is not named: {said}")
-            self.noticed += 1
-            self.back(number)
-        elif not whole:
-            raise SystemExit(f"A MIX IS NOT NOTICED: exit code {seen}: {said}")
-        elif code is None:
-            self.back(number)
 
 
 def trial(killer: Killer, until: float) -> int:
@@ -211,7 +215,7 @@ def trial(killer: Killer, until: float) -> int:
         if killer.of == "apply":
             killer.apply("ba"[(jobs - 1) % 2] + ".json", True)
         else:
-            killer.undo(1 + jobs % 2)
+            killer.back(1 + jobs % 2)
     return jobs
 
 
@@ -242,6 +246,8 @@ def main() -> None:
     whom = {"program": "the program", "mock": "the mock", "both": "program and mock at once"}
     ran = f"{kills} kills in {jobs} times {options.of}, {whom[options.whom]}"
     says = f"moved with whole sets alone; {killer.noticed} times a set was refused, and undo named"
+    if options.of == "undo":
+        says += f"; {killer.mixed} of them were mixed"
     print(f"{ran}, {time.monotonic() - begun:.0f} s, seed {options.seed}: {says}")
     if options.page:
         command = f"kill_writeback --of {options.of} --whom {options.whom} --kills {options.kills}"
