@@ -252,6 +252,12 @@ def _serial(nvm: Path | None) -> int:
     return int(label.read_text(encoding="ascii"))
 
 
+def hidden_of(options: argparse.Namespace) -> Hidden:
+    """What is wrong with the machine: a file's table, and over it what was typed."""
+    hidden = Hidden.read(options.hidden) if options.hidden is not None else Hidden()
+    return Hidden({**hidden.values, **dict(options.effect)})
+
+
 def build(options: argparse.Namespace) -> MockStation:
     """Make the station that the command line asks for; raises ValueError or OSError."""
     own = own_files(options.machine, options.eds, options.bare)
@@ -262,13 +268,10 @@ def build(options: argparse.Namespace) -> MockStation:
         if options.truth is not None
         else draw_parameters(machine, options.seed)
     )
-    hidden = Hidden.read(options.hidden) if options.hidden is not None else Hidden()
-    if options.effect:
-        hidden = Hidden({**hidden.values, **dict(options.effect)})
     plan = WorldPlan(
         seed=options.seed,
         parameters=parameters,
-        hidden=hidden,
+        hidden=hidden_of(options),
         smrs=options.smrs,
         base_smrs=not options.no_base_smrs,
         machine=options.machine,

@@ -8,7 +8,7 @@ from mocks.arguments import parser
 from mocks.hands import address_of
 from mocks.hidden.table import Hidden
 from mocks.physics.truth import machine_file, read_parameters
-from mocks.station import build
+from mocks.station import hidden_of
 
 HEXAPOD = machine_file("hexapod")
 
@@ -68,9 +68,9 @@ def test_a_site_names_the_socket_of_its_mock(tmp_path: Path) -> None:
 def test_hidden_effects_of_the_command_line_stand_over_those_of_the_file(tmp_path: Path) -> None:
     path = written(tmp_path, "h.toml", '[hidden]\n"backlash.leg3" = 0.02\n"backlash.leg1" = 0.01\n')
     told = ["hexapod", "--hidden", str(path), "--effect", "backlash.leg3=0.03"]
-    station = build(parser().parse_args([*told, "--effect", "screw-twist.L=2"]))
+    options = parser().parse_args([*told, "--effect", "screw-twist.L=2"])
     wanted = {"backlash.leg1": 0.01, "backlash.leg3": 0.03, "screw-twist.L": 2.0}
-    assert station.world.plan.hidden.values == wanted
+    assert hidden_of(options).values == wanted
     for wrong in ("backlash.leg3", "backlash.leg3=far"):
         with pytest.raises(SystemExit) as ended:
             parser().parse_args([*told[:1], "--effect", wrong])
