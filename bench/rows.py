@@ -1,6 +1,6 @@
 """Runs that were once answered wrongly, each by a public command, and today's answers as a page.
 
-    python -m bench rows [--only NAME ...] [--out FILE] [--page docs/once-wrong.md]
+    python -m bench rows [--only NAME ...] [--out FILE] [--page docs/discovery-statistics.md]
 
 Every row simulates runs by the mock's own physics (some are spoilt as people spoil them), discovers
 them, and holds the answer against what was hidden. A row is a line of FILE, of which the same
