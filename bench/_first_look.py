@@ -32,7 +32,7 @@ def clean(seed: int) -> tuple[str, tuple[str, ...]]:
         rows = first_look(machine_named(machine), [run])
     except BadInput as error:
         return effect, (str(error),)
-    right = {"actuator-step": "actuator-slipped"}.get(effect)
+    right = {"actuator-step": "actuator-slipped", "nest-step": "nest-moved"}.get(effect)
     return effect, tuple(remark.name for remark in rows.remarks if remark.name != right)
 
 
@@ -45,6 +45,7 @@ def mistaken(asked: tuple[str, str, str, int]) -> tuple[str, str, str]:
     """What is said of a mistake on a machine, in an order: its name, the outcome, the words."""
     name, machine, order, seed = asked
     mistake = MISTAKES[name]
-    clean = clean_run(machine, 50_000 + seed, poses=32, order=order)
+    hidden = mistake.hidden.get(machine)
+    clean = clean_run(machine, 50_000 + seed, poses=32, order=order, hidden=hidden)
     run = mistake.make(clean, np.random.default_rng([seed, zlib.crc32(name.encode())]))
     return name, *said_of(mistake, machine_named(machine), run)

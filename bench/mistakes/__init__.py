@@ -9,6 +9,7 @@ from bench.mistakes import labels, motion, readings, units
 from bench.mistakes.clean import machine_named
 from bench.mistakes.everyday import EVERYDAY
 from bench.mistakes.mistake import Mistake
+from bench.mistakes.variations import VARIATIONS
 from calib.arrays import Array
 from calib.discover.agreement import untrue_uncertainties
 from calib.effects import effect_named
@@ -206,7 +207,7 @@ _READINGS = {
     "zeros at the start": Mistake(readings.zeros_at_the_start, ("zero-readings",)),
     "two zeros": Mistake(readings.zeros_here_and_there, ("zero-readings",)),
     "three readings of -1, -1, -1": Mistake(readings.sentinels, ("same-readings",)),
-    "z is 0 five times": Mistake(readings.one_axis_zero, ("stale-column",)),
+    "z is 0 five times": Mistake(readings.one_axis_zero, ("stale-column", "sentinel-readings")),
     "readings no longer change": Mistake(readings.stale, ("stale-readings",)),
     "six readings repeat": Mistake(readings.stale_for_a_while, ("stale-readings",)),
     "three single readings repeat": Mistake(readings.stale_pairs, ("stale-readings",)),
@@ -256,7 +257,7 @@ _STATION = {
 }
 MISTAKES: Mapping[str, Mistake] = {
     **_LABELS, **_POINTS, **_COMMANDS, **_CLOCK, **_CHANNELS, **_READINGS, **_STATION,
-    **EVERYDAY,
+    **EVERYDAY, **VARIATIONS,
 }  # fmt: skip
 """Every mistake by its name."""
 WRONG = ("silent", "wrong", "refused in other words", "named among others")

@@ -1,7 +1,7 @@
 """A mistake: what is done to a clean run, and what is to be said of it."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -20,3 +20,5 @@ class Mistake:
     says: tuple[str, ...] = ()
     refused: str = ""
     only: tuple[str, ...] = THREE
+    hidden: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    """Physics that is in the run besides, by machine."""

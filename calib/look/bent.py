@@ -9,21 +9,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib.arrays import Array, BoolArray
+from calib.arrays import Array
 from calib.identify.fitting import Fit
 from calib.look.digits import decimals_of
 from calib.look.gravity import weight_fall
 from calib.look.scan import excess, fit_of, scan
-from calib.look.seats import ALONG, normal_of, radii_in_words
+from calib.look.seat_off import seat_columns
 from calib.mechanism.description import Machine
-from calib.mechanism.rigid import rotate
 from calib.runs.record import Run
 from calib.runs.remark import Remark, ranges
 
 FALL = 100.0
 """Least fall of the cost by which such a hypothesis is held."""
-SLIP_SHARE, FRAME_SHARE = 0.9, 0.9
-"""Least part of what is too much that a slip, and a frame, must explain."""
+SLIP_SHARE = 0.9
+"""Least part of what is too much that a slip must explain."""
 NOT_STATED = 40.0
 """Fall of the cost by which the machine file's values must be better than those stated."""
 LOUD = 2.0
@@ -34,8 +33,6 @@ SLOW_S = (300.0, 1200.0, 4800.0)
 """Time constants, s, with which an actuator may warm up."""
 LEAST = 3
 """Readings on either side of a step."""
-SMALLEST_MM = 0.3
-"""Offset of a whole table, mm, below which it is a matter of tolerances."""
 NEAR = 3.0
 """Times by which the misfit may differ from what rounding predicts."""
 _Known = Mapping[str, Array]
@@ -101,7 +98,7 @@ def _of_a_nest(fitted: Fit) -> float:
     """Fall by the one nest that is off throughout: read in turn, nests step like an actuator."""
     names = np.array(fitted.model.rows.nest_name, dtype=object)
     falls = [
-        float(scan(fitted, _columns(fitted, names == name, platform=True)).fall[0])
+        float(scan(fitted, seat_columns(fitted, names == name, room=False)).fall[0])
         for name in fitted.model.rows.runs[0].header.platform_nests
         if np.any((names == name) & fitted.accepted)
     ]
@@ -133,73 +130,6 @@ class Mended:
 
     run: Run
     remark: Remark
-
-
-def table_frame(machine: Machine, run: Run, fitted: Fit) -> Mended | None:
-    """All nests of the platform, or of the base, off by one amount."""
-    rows = fitted.model.rows
-    best: tuple[float, bool, Array] | None = None
-    for platform in (True, False):
-        which = rows.on_platform == platform
-        if not which[fitted.accepted].any() or which[fitted.accepted].all():
-            continue
-        tried = scan(fitted, _columns(fitted, which, platform=platform))
-        if best is None or tried.fall[0] > best[0]:
-            best = (float(tried.fall[0]), platform, tried.sizes[0])
-    if best is None or best[0] < max(FALL, FRAME_SHARE * excess(fitted)):
-        return None
-    _, platform, offset = best
-    if np.linalg.norm(offset) < SMALLEST_MM:
-        return None
-    again = fit_of(machine, _shifted(run, offset, platform=platform))
-    if again is not None:
-        which = again.model.rows.on_platform == platform
-        offset = offset + scan(again, _columns(again, which, platform=platform)).sizes[0]
-    return Mended(
-        _shifted(run, offset, platform=platform), _frame_remark(run, offset, platform=platform)
-    )
-
-
-def _columns(fitted: Fit, which: BoolArray, *, platform: bool) -> Array:
-    """Whitened columns (3, 3, A) of moving all nests of a table, in its frame."""
-    situation = fitted.linear.situation
-    unit = np.repeat(np.eye(3)[:, :, None], which.size, axis=2) * which
-    turned = np.stack([rotate(situation.rotation, one) for one in unit]) if platform else unit
-    whitened = np.einsum("ijn,kjn->kin", situation.whitened_frame, turned)
-    return np.asarray(whitened[:, :, fitted.accepted], dtype=np.float64)
-
-
-def _shifted(run: Run, offset: Array, *, platform: bool) -> Run:
-    header = run.header
-    table = header.platform_nests if platform else header.base_nests
-    moved = {nest: place + offset for nest, place in table.items()}
-    if platform:
-        return replace(run, header=replace(header, platform_nests=moved))
-    return replace(run, header=replace(header, base_nests=moved))
-
-
-def _frame_remark(run: Run, offset: Array, *, platform: bool) -> Remark:
-    table = "platform" if platform else "base"
-    size = float(np.linalg.norm(offset))
-    told = ", ".join(f"{value:+.3f}" for value in offset)
-    says = (
-        f"All nests of [nests.{table}] are off by {size:.3g} mm alike ({told} mm): they are given "
-        "from another origin"
-    )
-    along = abs(float(normal_of(run.header) @ offset)) if platform else abs(float(offset[2]))
-    if along > ALONG * size:
-        says += f", or read with SMRs of another size than the others{radii_in_words(along)}"
-    return Remark(
-        "nests-frame",
-        says,
-        (),
-        "No machine within its tolerances is so far off; with the table moved by that it is within "
-        "them",
-        "Fitted with the table moved by that",
-        f"Give [nests.{table}] in the frame of the machine file, SMR centres",
-        True,
-        run.source,
-    )
 
 
 def not_stated(machine: Machine, run: Run, fitted: Fit) -> Mended | None:

@@ -21,15 +21,16 @@ from calib.look.places import Places, places_of, points_of_one, roughly_known
 from calib.look.point_units import point_units
 from calib.look.pose_labels import pose_labels
 from calib.look.proposal import Proposal
+from calib.look.refined import refined
 from calib.look.repeats import no_measurements
 from calib.look.rewritten import rewritten
 from calib.look.rivals import bears_out, better_story, with_fit
-from calib.look.seat_off import seat_refined
 from calib.look.seats import displaced_seat
 from calib.look.sigmas import in_um, sigmas
 from calib.look.slid import check_columns, slid_rows
 from calib.look.slid_commands import slid_commands
 from calib.look.story import Story
+from calib.look.table_frames import framed_table
 from calib.look.tables import turned_table
 from calib.look.temperatures import temperatures
 from calib.look.travel import check_travel
@@ -41,8 +42,8 @@ from calib.runs.stack import Rows, stack
 _Look = Callable[[Run], tuple[Run, list[Remark]]]
 _Hypothesis = Callable[[Places], Proposal | None]
 HYPOTHESES: tuple[_Hypothesis, ...] = (
-    other_labels, rewritten, displaced_seat, moved_station, mirrored_table, any_labels,
-    turned_table, slid_rows, held_actuator,
+    other_labels, rewritten, displaced_seat, turned_table, framed_table, moved_station,
+    mirrored_table, any_labels, slid_rows, held_actuator,
 )  # fmt: skip
 """What may explain readings that stand in no nest; the first that explains all is taken."""
 OF_COLUMNS: tuple[_Look, ...] = (clock, temperatures, load_and_payload)
@@ -189,8 +190,7 @@ def _places(machine: Machine, run: Run) -> tuple[list[Run], list[Remark], _Known
         if best is None:
             break
         meant, remark = best.take()
-        if remark.name in {"smr-size", "nest-displaced"}:
-            meant = seat_refined(machine, run, meant)
+        meant = refined(machine, run, meant, remark)
         run = meant
         remarks.append(remark)
         if remark.name == "station-moved":

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from calib.arrays import Array
+from calib.look.digits import decimals_of
+from calib.look.masses import BY_CHANCE, in_other_unit
 from calib.runs.header import Load
 from calib.runs.record import Run
 from calib.runs.remark import Remark, lines_in_words, ranges
@@ -16,12 +18,10 @@ EARTH = (9.75, 9.86)
 _GRAVITY_UNITS = ((STANDARD, "g"), (0.001, "mm/s^2"), (0.01, "cm/s^2"), (0.3048, "ft/s^2"))
 HEAVIEST = 2000.0
 """Mass of a platform, kg, above which it is in grams."""
-POUND = 0.45359237
-"""kg."""
-ROUND = 6e-4
-"""How near (kg) a mass must be to a round one."""
 SENTINELS = (-1.0, 999.0, 9999.0, -999.0, -9999.0, 99999.0)
 """What is written instead of a mass, exactly."""
+UNKNOWN = Load(np.array([0.0, 0.0, -STANDARD]), 0.0, np.zeros(3), np.zeros(3))
+"""What is taken for granted where [load] is not there."""
 HEAVY = 100.0
 """Payload over the mass of the platform that no machine carries."""
 
@@ -30,7 +30,8 @@ def load_and_payload(run: Run) -> tuple[Run, list[Remark]]:
     """Look at what the machine carries; only the unit of gravity is certain and converted."""
     load = run.header.load
     if load is None:
-        return run, []
+        run, lost = _lost(run)
+        return run, [*lost, *_payload(run, UNKNOWN)]
     remarks = []
     load, remark = _gravity(run, load)
     if remark is not None:
@@ -71,24 +72,38 @@ def _gravity(run: Run, load: Load) -> tuple[Load, Remark | None]:
 
 
 def _centres(run: Run, load: Load) -> list[Remark]:
-    """Centres of mass that are a thousand times too near the origin: metres."""
+    """Centres of mass that are no round numbers as they stand, and in m or inches are."""
     found = []
     for key, centre in (("platform_com", load.platform_com), ("payload_com", load.payload_com)):
         size = float(np.linalg.norm(centre))
-        if 0.0 < size < 0.5 and float(np.max(np.abs(1000.0 * centre % 1.0))) < 1e-6:
+        for unit, factor, largest in (("m", 1000.0, 0.5), ("inches", 25.4, 40.0)):
+            if not 0.0 < size < largest or not _round_once(centre, factor):
+                continue
             found.append(
                 Remark(
                     "centre-of-mass-unit",
-                    f"[load] {key} looks like m: it lies {size:.3g} mm from the platform's origin",
+                    f"[load] {key} looks like {unit}: it lies {size:.3g} mm from the platform's "
+                    "origin",
                     (),
-                    f"In m it would be {1000 * size:.4g} mm, a round number",
+                    f"In {unit} it would be {factor * size:.4g} mm, of round numbers",
                     "Taken as it stands: what is found for the weight may be off",
                     f"Write {key} in mm",
                     False,
                     run.source,
                 )
             )
+            break
     return found
+
+
+def _round_once(centre: Array, factor: float) -> bool:
+    """Whether numbers are whole mm once they are multiplied, and have more digits as they stand."""
+    there = centre[centre != 0.0]
+    digits = decimals_of(there)
+    half = 0.5 * 10.0**-digits * factor + 1e-6
+    whole = np.abs(factor * there - np.round(factor * there))
+    by_chance = (2.0 * half) ** there.size
+    return digits > 1 and bool(np.all(whole < half)) and (factor > 100.0 or by_chance < BY_CHANCE)
 
 
 def _carries(run: Run, load: Load) -> bool:
@@ -116,36 +131,26 @@ def _payload(run: Run, load: Load) -> list[Remark]:
     heaviest = float(np.nanmax(masses))
     if np.nanmin(masses) < 0.0:
         return [_masses(run, "payload-negative", "payload_kg is negative: no mass is")]
-    if _in_pounds(masses):
+    other = in_other_unit(masses)
+    if other is not None:
+        unit, factor, odd = other
+        lines = () if np.all(odd | ~(masses > 0.0)) else ranges(run.line[odd], run.line)
+        largest = float(np.nanmax(masses[odd]))
+        name = "lb" if unit == "lb" else unit.split(" ")[0]
+        where = f" in {lines_in_words(lines)}" if lines else ""
         return [
             _masses(
                 run,
-                "payload-in-lb",
-                f"payload_kg looks like lb: {heaviest:g} is {POUND * heaviest:.4g} kg",
+                f"payload-in-{name}",
+                f"payload_kg looks like {unit}{where}: {largest:g} is {factor * largest:.4g} kg",
+                lines,
             )
         ]
-    if load.platform_mass_kg == 0.0 or heaviest < HEAVY * load.platform_mass_kg:
+    of = load.platform_mass_kg
+    if heaviest < (HEAVY * of if of > 0.0 else HEAVIEST):
         return []
-    return [
-        _masses(
-            run,
-            "payload-in-grams",
-            f"payload_kg looks like grams: {heaviest:g} kg on a platform of "
-            f"{load.platform_mass_kg:g} kg",
-        )
-    ]
-
-
-def _in_pounds(masses: Array) -> bool:
-    """Whether all masses are round in kg once they are read as lb, and none is as it stands."""
-    there = np.unique(masses[np.isfinite(masses) & (masses > 0.0)])
-    if there.size == 0:
-        return False
-    return bool(np.all(_off_round(POUND * there) < ROUND) and np.all(_off_round(there) > 0.02))
-
-
-def _off_round(masses: Array) -> Array:
-    return np.abs(masses - 0.5 * np.round(2.0 * masses))
+    on = f" on a platform of {of:g} kg" if of > 0.0 else ""
+    return [_masses(run, "payload-in-grams", f"payload_kg looks like grams: {heaviest:g} kg{on}")]
 
 
 def _lost(run: Run) -> tuple[Run, list[Remark]]:
@@ -177,11 +182,11 @@ def _lost(run: Run) -> tuple[Run, list[Remark]]:
     ]
 
 
-def _masses(run: Run, name: str, says: str) -> Remark:
+def _masses(run: Run, name: str, says: str, lines: tuple[tuple[int, int], ...] = ()) -> Remark:
     return Remark(
         name,
         says,
-        (),
+        lines,
         "The size is implausible for this machine",
         "Taken as it stands: what is found for the weight is off by that factor",
         "Write payload_kg in kg",

@@ -5,14 +5,16 @@ SMR 0.3 mm higher), so the fitted geometry is projected out.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from calib.arrays import Array
 from calib.identify.fitting import Fit
-from calib.look.bent import not_stated, rounded_commands, slip, slip_remark, table_frame
+from calib.look.bent import not_stated, rounded_commands, slip, slip_remark
 from calib.look.gravity import gravity_elsewhere
-from calib.look.reflector import other_reflector
+from calib.look.many import several_steps
+from calib.look.reflector import lifted_throughout, other_reflector
 from calib.look.scan import fit_of, prior_cost, with_the_excluded
 from calib.look.seat_off import reseated, seat_off
 from calib.look.several import beyond_one_step, stepped_fit
@@ -20,12 +22,13 @@ from calib.look.shape import other_shape, stretched
 from calib.look.sigmas import sigmas_of_all
 from calib.look.steps import frame_step, step_remark
 from calib.look.story import Story
+from calib.look.table_frames import table_frame
 from calib.mechanism.description import Machine
 from calib.runs.record import Run
 
 LOUD = 2.0
 """Chi-square per degree of freedom from which on the record itself is in question."""
-BENT = 2.5
+BENT = 1.8
 """Cost of the priors a parameter from which on the geometry was bent to fit the record."""
 LEAST = 3
 """Readings left out from which on they are looked at with the others."""
@@ -67,7 +70,12 @@ def look_at_misfit(machine: Machine, run: Run, known: _Known, *, alone: bool) ->
     if known:
         more = beyond_one_step(machine, run, fitted) if alone else None
         return as_it_is if more is None else Story(more[0], [more[1]], {})
-    return of_places(machine, run, fitted, alone=alone) or _last(machine, run, fitted) or as_it_is
+    return (
+        of_places(machine, run, fitted, alone=alone)
+        or (_of_steps(machine, run) if alone else None)
+        or _last(machine, run, fitted)
+        or as_it_is
+    )
 
 
 def loud(fitted: Fit) -> bool:
@@ -88,11 +96,15 @@ def of_places(machine: Machine, run: Run, fitted: Fit, *, alone: bool) -> Story 
         return Story([run], [step_remark(fitted, found)], {"frame-shift": found.values})
     slipped = slip(fitted) if alone else None
     if slipped is not None and (seat is None or slipped.fall > seat.fall):
-        return Story([run], [slip_remark(fitted, slipped)], {"actuator-step": slipped.values})
+        once = Story([run], [slip_remark(fitted, slipped)], {"actuator-step": slipped.values})
+        again = fit_of(machine, run, once.known)
+        loud_still = again is None or again.chi2_per_dof > LOUD
+        both = _of_steps(machine, run) if loud_still else None
+        return both or replace(once, fit=again)
     if seat is not None:
         moved, remark = reseated(machine, run, fitted, seat)
         return Story([moved], [remark], {})
-    mended = table_frame(machine, run, fitted)
+    mended = table_frame(machine, run, fitted) or lifted_throughout(run, fitted)
     return None if mended is None else Story([mended.run], [mended.remark], {})
 
 
@@ -112,6 +124,12 @@ def each_of_places(machine: Machine, run: Run, fitted: Fit, *, alone: bool) -> l
         known = {"actuator-step": slipped.values}
         found.append(Story([run], [slip_remark(fitted, slipped)], known))
     return found
+
+
+def _of_steps(machine: Machine, run: Run) -> Story | None:
+    """Several steps of the frame and of actuators."""
+    found = several_steps(machine, run)
+    return None if found is None else Story(*found, {})
 
 
 def _last(machine: Machine, run: Run, fitted: Fit) -> Story | None:

@@ -20,10 +20,12 @@ FALL = 100.0
 """Least fall of the cost by which it is held."""
 SHARE = 0.9
 """Least part of what is too much that it must explain."""
+CLEAR = 30.0
+"""Fall by which a moment must beat the whole run."""
 LEAST = 3
 """Readings on either side of the moment."""
-SMALLEST_MM = 0.3
-"""Offset, mm, below which it is a matter of effects."""
+SMALLEST_MM, LARGEST_MM = 0.3, 40.0
+"""Offset, mm, below which it is a matter of effects, and beyond which it is no reflector."""
 
 
 def other_reflector(run: Run, fitted: Fit) -> Mended | None:
@@ -41,15 +43,28 @@ def other_reflector(run: Run, fitted: Fit) -> Mended | None:
         if tried.fall[inner].size == 0:
             return None
         at = int(np.argmax(tried.fall[inner])) + LEAST
+        if kind == "lift" and tried.fall[0] > tried.fall[at] - CLEAR:
+            at = 0  # throughout
         if best is None or tried.fall[at] > best[0]:
-            best = (float(tried.fall[at]), kind, int(kept[at]), float(tried.sizes[at, 0]), way)
-    if best is None or best[0] < max(FALL, SHARE * excess(fitted)) or abs(best[3]) < SMALLEST_MM:
+            row = int(kept[at]) if at else 0
+            best = (float(tried.fall[at]), kind, row, float(tried.sizes[at, 0]), way)
+    if (
+        best is None
+        or best[0] < max(FALL, SHARE * excess(fitted))
+        or not (SMALLEST_MM < abs(best[3]) < LARGEST_MM)
+    ):
         return None
     _, kind, row, size, way = best
     read = np.flatnonzero(run.measured)
     position = run.position.copy()
     position[:, read[row:]] -= size * way[:, row:]
     return Mended(replace(run, position=position), _remark(fitted, kind, row, size))
+
+
+def lifted_throughout(run: Run, fitted: Fit) -> Mended | None:
+    """The same where all nests were read so in the whole run; nothing else."""
+    found = other_reflector(run, fitted)
+    return None if found is None or found.remark.lines else found
 
 
 def _upright(fitted: Fit) -> Array:
@@ -72,8 +87,9 @@ def _remark(fitted: Fit, kind: str, row: int, size: float) -> Remark:
     line = rows.line[row]
     if kind == "lift":
         name = "smr-size"
+        when = f"From line {line} on" if row else "Throughout"
         says = (
-            f"From line {line} on an SMR of another size was read in all nests: {size:+.3f} mm "
+            f"{when} an SMR of another size was read in all nests: {size:+.3f} mm "
             f"along their normals{radii_in_words(abs(size))}"
         )
     else:
@@ -85,10 +101,15 @@ def _remark(fitted: Fit, kind: str, row: int, size: float) -> Remark:
     return Remark(
         name,
         says,
-        ranges(rows.line[row:], rows.line),
-        "One number explains it; a station that moved needs six and does so worse",
+        ranges(rows.line[row:], rows.line) if row else (),
+        "One number explains it; a station that moved needs six and does so worse"
+        if row
+        else "One number explains it: with the tables as they stand no machine within its "
+        "tolerances does",
         "Read with that taken back; nothing is excluded for it",
-        "Read all nests with one reflector, and tell the tracker's program which",
+        "Read all nests with one reflector, and tell the tracker's program which"
+        if row
+        else "Give the nest tables for the SMR that was read, or tell the tracker's program which",
         True,
         rows.runs[0].source,
     )

@@ -13,6 +13,7 @@ from calib.arrays import Array, BoolArray, IntArray
 from calib.chance import poisson_at_least
 from calib.look.digits import decimals_of
 from calib.look.filled import filled_down
+from calib.look.sentinels import sentinels
 from calib.runs.record import Run
 from calib.runs.remark import Remark, lines_in_words, ranges
 
@@ -27,7 +28,7 @@ ONE_AXIS = 5
 def no_measurements(run: Run) -> tuple[Run, list[Remark]]:
     """Set aside readings of exactly zero, rows that stand twice, and readings that are stale."""
     remarks = []
-    for look in (_zeros, _twice, _stale, _same, _stale_axes, filled_down):
+    for look in (_zeros, _twice, _stale, _same, _stale_axes, filled_down, sentinels):
         which, remark = look(run)
         if remark is not None:
             run = replace(run, measured=run.measured & ~which)

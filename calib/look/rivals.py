@@ -13,11 +13,13 @@ import numpy as np
 
 from calib.arrays import Array
 from calib.identify.fitting import Fit
+from calib.look.bent import not_stated
+from calib.look.many import several_steps
 from calib.look.misfit import each_of_places
 from calib.look.places import Places, places_of
 from calib.look.proposal import Proposal
+from calib.look.refined import refined
 from calib.look.scan import excess, fit_together, from_nominal
-from calib.look.seat_off import seat_refined
 from calib.look.several import parted
 from calib.look.shape import other_shape, stretched
 from calib.look.story import Story
@@ -62,6 +64,7 @@ def better_story(
     begun = [Story([run], [], {})]
     for propose in hypotheses:
         begun += _begun(machine, run, propose)
+    begun += _not_held(machine, run)
     best = judged
     for story in begun:
         found = _gone_on(machine, story, alone=alone)
@@ -91,10 +94,16 @@ def _begun(machine: Machine, run: Run, propose: Hypothesis) -> list[Story]:
         meant, remark = proposal.take()
         if remark.name == "station-moved" and not proposal.known:
             continue  # its parts are tried by the first account
-        if remark.name in {"smr-size", "nest-displaced"}:
-            meant = seat_refined(machine, run, meant)
+        meant = refined(machine, run, meant, remark)
         found.append(Story([meant], [remark], proposal.known))
     return found
+
+
+def _not_held(machine: Machine, run: Run) -> list[Story]:
+    """An account that begins with parameters which the controller did not hold."""
+    fitted = fit_together(machine, [run]) if run.header.controller_parameters else None
+    mended = None if fitted is None else not_stated(machine, run, fitted)
+    return [] if mended is None else [Story([mended.run], [mended.remark], {})]
 
 
 def _gone_on(machine: Machine, story: Story, *, alone: bool) -> Story:
@@ -112,6 +121,9 @@ def _gone_on(machine: Machine, story: Story, *, alone: bool) -> Story:
         parts = parted(machine, run) if alone and not best.remarks else None
         if parts is not None:
             tried.append(Story(parts[0], [parts[1]], {}))
+        steps = several_steps(machine, run) if alone else None
+        if steps is not None:
+            tried.append(Story(*steps, {}))
         judged = [
             with_fit(machine, replace(one, remarks=[*best.remarks, *one.remarks])) for one in tried
         ]

@@ -71,8 +71,8 @@ def fit_together(
     try:
         rows = replace(stack(machine, runs), known=known or {})
         return fit_effects(rows, [effect_named(name, machine) for name in rows.known])
-    except BadInput:
-        return None  # the fit that was asked for says it
+    except (BadInput, np.linalg.LinAlgError):
+        return None  # the fit that was asked for says it; parts may be too small for a frame
 
 
 def from_nominal(machine: Machine, runs: Sequence[Run]) -> Fit | None:

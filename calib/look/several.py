@@ -78,7 +78,7 @@ def parted(machine: Machine, run: Run) -> tuple[list[Run], Remark] | None:
         if found is None or found.row in edges:
             break
         edges = sorted([*edges, found.row])
-        parts = _split(run, edges)
+        parts = split(run, edges)
     whole, fitted = from_nominal(machine, [run]), fit_together(machine, parts)
     if len(edges) < 2 or fitted is None or whole is None:
         return None
@@ -93,7 +93,7 @@ def _parts(machine: Machine, run: Run, stepped: Fit) -> tuple[list[Run], Remark]
     fitted = stepped
     parts = [run]
     while len(edges) < MOST_STEPS:
-        parts = _split(run, edges)
+        parts = split(run, edges)
         again = fit_together(machine, parts)
         if again is None:
             return None
@@ -127,7 +127,7 @@ def _parts_remark(run: Run, stepped: Fit, edges: list[int], fitted: Fit) -> Rema
     )
 
 
-def _split(run: Run, edges: list[int]) -> list[Run]:
+def split(run: Run, edges: list[int]) -> list[Run]:
     """The run in parts before and after the readings ``edges``, each with the whole way."""
     read = np.flatnonzero(run.measured)
     parts = []

@@ -83,13 +83,13 @@ def other_shape(machine: Machine, run: Run) -> Mended | None:
         table = _table(nests, read) if off else None
         if table is None:
             continue
-        meant = _placed(machine, with_table(run, key, table), key)
+        meant = placed(machine, with_table(run, key, table), key)
         after = fit_of(machine, meant)
         if before is None or after is None or excess(after) > (1.0 - FALL) * excess(before):
             continue
         if len(after.bad) > MOST_BAD or after.chi2_per_dof > LOUDEST:
             continue  # nests that moved against one another while they were read
-        return Mended(meant, _shape_remark(run, key, off))
+        return Mended(meant, _shape_remark(run, key, off, read))
     return None
 
 
@@ -99,8 +99,8 @@ def with_table(run: Run, key: str, table: Mapping[str, Array]) -> Run:
     return replace(run, header=replace(run.header, **changed))
 
 
-def _placed(machine: Machine, run: Run, key: str) -> Run:
-    """The run with the table of one body moved rigidly to where a fit wants it."""
+def placed(machine: Machine, run: Run, key: str) -> Run:
+    """The run with one table, ``platform`` or ``base``, moved rigidly to where a fit wants it."""
     fitted = fit_of(machine, run)
     if fitted is None:
         return run
@@ -171,12 +171,15 @@ def _table(nests: Mapping[str, Array], read: Pairs) -> dict[str, Array] | None:
     return {**nests, **{name: best[:, k] for k, name in enumerate(names)}}
 
 
-def _shape_remark(run: Run, key: str, off: Mapping[tuple[str, str], float]) -> Remark:
+def _shape_remark(run: Run, key: str, off: Mapping[tuple[str, str], float], read: Pairs) -> Remark:
     told = ", ".join(f"{a} to {b} {value:+.3f} mm" for (a, b), value in list(off.items())[:4])
+    common = set.intersection(*(set(pair) for pair in off))
+    rest = {pair for pair in read if not common & set(pair)}
+    alone = f" nest {next(iter(common))} alone," if len(common) == 1 and rest else ""
     return Remark(
         "nest-table",
-        f"[nests.{key}] is not the table of this {key}: distances between nests are read otherwise "
-        f"than it states ({told})",
+        f"[nests.{key}] is not the table of this {key}:{alone} distances between nests are read "
+        f"otherwise than it states ({told})",
         (),
         "Nests on one body keep their distances, whatever the machine does",
         "Fitted with the nests as far apart as they were read; where the table as a whole sits is "

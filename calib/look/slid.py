@@ -13,6 +13,8 @@ from calib.look.proposal import Proposal
 from calib.runs.record import Run
 from calib.runs.remark import Remark, ranges
 
+ROWS = (1, -1, 2, -2, 3, -3)
+"""Rows by which columns slide."""
 ENOUGH = 0.9
 """Part of them that must stand in their nests once it is taken otherwise."""
 
@@ -49,9 +51,9 @@ def slid_rows(places: Places) -> Proposal | None:
     """Readings that stand a row too late, or too early, from some row on or throughout."""
     best: Proposal | None = None
     count = places.rows.count
-    for by in (1, -1):
+    for by in ROWS:
         base = np.roll(places.base, by, axis=1)
-        edge = 0 if by > 0 else count - 1
+        edge = slice(0, by) if by > 0 else slice(count + by, count)
         rotation, position, inside = robust_align(base, places.seen, places.slack)
         inside[edge] = False
         for frame, slid in (
@@ -63,14 +65,19 @@ def slid_rows(places: Places) -> Proposal | None:
             after = np.concatenate([np.cumsum(slid[::-1])[::-1], [0]])
             at = int(np.argmax(before + after))
             explained = int((before + after)[at])
-            if explained < ENOUGH * count or at > count - 4:
+            if explained < ENOUGH * count or at > count - 4 - abs(by):
                 continue
             if best is None or explained > best.explained:
                 best = Proposal(explained, partial(_put_back, places, at, by))
     return best
 
 
-def _inside_of(places: Places, base: Array, frame: Frame, edge: int) -> BoolArray:
+def rows_in_words(by: int) -> str:
+    """``one row``, ``two rows``."""
+    return ("one row", "two rows", "three rows")[abs(by) - 1]
+
+
+def _inside_of(places: Places, base: Array, frame: Frame, edge: slice) -> BoolArray:
     found = places.inside(frame, base)
     found[edge] = False
     return found
@@ -88,16 +95,16 @@ def _put_back(places: Places, at: int, by: int) -> tuple[Run, Remark]:
     position[:, read[here[good]]] = run.position[:, read[source[good]]]
     covariance[:, :, read[here[good]]] = run.covariance[:, :, read[source[good]]]
     measured[read[here[~good]]] = False
-    late = "late" if by > 0 else "early"
+    late = f"{rows_in_words(by)} too {'late' if by > 0 else 'early'}"
     lines = ranges(run.line[read[here]], run.line[read])
-    where = "in all rows" if at <= 1 else f"from line {run.line[read[at]]} on"
+    where = "in all rows" if at <= abs(by) else f"from line {run.line[read[at]]} on"
     return replace(run, position=position, covariance=covariance, measured=measured), Remark(
         "rows-shifted",
-        f"x, y, z stand one row too {late} {where}: a reading was lost or written twice",
+        f"x, y, z stand {late} {where}: a reading was lost or written twice",
         lines,
-        "Each reading stands where the nest of the row beside it was, not its own",
-        "Fitted with x, y, z put back by one row",
-        f"Put x, y, z back by one row {where}",
+        "Each reading stands where the nest of another row was, not its own",
+        f"Fitted with x, y, z put back by {rows_in_words(by)}",
+        f"Put x, y, z back by {rows_in_words(by)} {where}",
         True,
         run.source,
     )

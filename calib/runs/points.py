@@ -313,8 +313,24 @@ def _check_time(table: _Table, time_s: Array) -> None:
             raise BadInput(
                 f"time goes back from {before:g} to {now:g} s",
                 place=table.place(row, "time_s"),
-                remedy="Expected rows in the order in which they were taken",
+                remedy="Expected rows in the order in which they were taken"
+                + _why_back(before, now),
             )
+
+
+def _why_back(before: float, now: float) -> str:
+    """What clocks and people do that makes a time go back by so much."""
+    by = before - now
+    if 3000.0 < by < 3600.0:
+        return "; was the clock put back by an hour (summer time)? Then add 3600 s from there on"
+    if 72000.0 < by < 86400.0 and now < 14400.0:
+        return "; is it the time of day, and past midnight there? Then add 86400 s from there on"
+    if now < 0.05 * before:
+        return (
+            "; time begins anew there: were two files joined? Then give each as a run of its own "
+            "(pkmcal fit RUN RUN)"
+        )
+    return ""
 
 
 def _covariances(table: _Table, sigma: Array, measured: NDArray[np.bool_]) -> Array:
