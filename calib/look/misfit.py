@@ -28,8 +28,9 @@ from calib.runs.record import Run
 
 LOUD = 2.0
 """Chi-square per degree of freedom from which on the record itself is in question."""
-BENT = 1.8
-"""Cost of the priors a parameter from which on the geometry was bent to fit the record."""
+BENT, BENT_TABLE = 2.5, 1.8
+"""Cost of the priors a parameter from which on the geometry was bent to fit the record; and from
+which on a table that is off as a whole is asked alone."""
 LEAST = 3
 """Readings left out from which on they are looked at with the others."""
 LOUDEST = 100.0
@@ -65,6 +66,9 @@ def look_at_misfit(machine: Machine, run: Run, known: _Known, *, alone: bool) ->
     if stated is not None:
         return Story([stated.run], [stated.remark], known)
     if not loud(fitted):
+        tilted = _table_alone(machine, run, fitted)
+        if tilted is not None:
+            return tilted
         elsewhere = gravity_elsewhere(fitted)
         return as_it_is if elsewhere is None else Story([run], [elsewhere], known, first)
     if known:
@@ -76,6 +80,14 @@ def look_at_misfit(machine: Machine, run: Run, known: _Known, *, alone: bool) ->
         or _last(machine, run, fitted)
         or as_it_is
     )
+
+
+def _table_alone(machine: Machine, run: Run, fitted: Fit) -> Story | None:
+    """A table off as a whole, where nothing but the geometry shows it."""
+    if prior_cost(fitted) < BENT_TABLE * fitted.model.free.size:
+        return None
+    mended = table_frame(machine, run, fitted)
+    return None if mended is None else Story([mended.run], [mended.remark], {})
 
 
 def loud(fitted: Fit) -> bool:
