@@ -19,9 +19,17 @@ class GateRefused(Exception):
         Which gate refused, and why, with the numbers.
     remedy : str, optional
         What the operator can do about it.
+    gates : tuple of str, optional
+        Those of the write-back that refused, by name.
     """
 
-    def __init__(self, what: str, *, remedy: str = "") -> None:
+    def __init__(self, what: str, *, remedy: str = "", gates: tuple[str, ...] = ()) -> None:
         self.what = what
         self.remedy = remedy
+        self.gates = gates
         super().__init__(f"{what}. {remedy}" if remedy else what)
+
+    @property
+    def nothing_to_gain(self) -> bool:
+        """Whether all else is well: the machine has as good parameters already."""
+        return self.gates == ("gain",)

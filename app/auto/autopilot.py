@@ -256,6 +256,9 @@ class Autopilot:
         try:
             left_out = await self.laboratory.apply(Path(model))
         except GateRefused as refused:
+            if refused.nothing_to_gain:  # as it stands it is what fresh poses are to judge
+                says = "left as it is: what the machine holds is as good as what was found"
+                return {"model": model, "left_out": {}, "says": says}
             return {REFUSED: str(refused), "says": f"not written: {refused}"}
         lacks = "".join(f"; not written: {name} ({why})" for name, why in left_out.items())
         return {"model": model, "left_out": dict(left_out), "says": f"written and kept{lacks}"}

@@ -51,9 +51,13 @@ class Gates:
 
 def refuse_if_any(checked: list[GateChecked], remedy: str) -> None:
     """Raise :class:`GateRefused` naming every gate that did not pass."""
-    failed = [gate.says for gate in checked if not gate.passed]
+    failed = [gate for gate in checked if not gate.passed]
     if failed:
-        raise GateRefused("; ".join(failed), remedy=remedy)
+        raise GateRefused(
+            "; ".join(gate.says for gate in failed),
+            remedy=remedy,
+            gates=tuple(gate.gate for gate in failed),
+        )
 
 
 @dataclass(frozen=True)

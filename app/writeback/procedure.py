@@ -261,6 +261,7 @@ def judged(
         raise GateRefused(
             "the controller holds this fit already",
             remedy="There is nothing to write; measure the machine again to see how good it is",
+            gates=("gain",),
         )
     sets = None
     if hosted and all(math.isfinite(value) for value in proposal.values.values()):

@@ -11,7 +11,7 @@ from app.auto.autopilot import Autopilot, Seen
 from app.auto.journal import NAME, Decisions
 from app.auto.policy import Decision, Limits
 from app.auto.report import report_of
-from app.errors import StoppedByOperator
+from app.errors import GateRefused, StoppedByOperator
 from app.files.pose_table import Pose, poses_text
 from app.jobs.posing import choose_poses
 from app.jobs.simulating import simulate
@@ -92,6 +92,24 @@ def test_the_whole_way_and_its_journal(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
+class Good(Simulated):
+    """Its machine was calibrated before."""
+
+    async def apply(self, model: Path) -> Mapping[str, str]:
+        raise GateRefused("gain: 1.1 (at most 1)", gates=("gain",))
+
+
+def test_a_machine_that_is_good_already_is_left_so_and_proven(tmp_path: Path) -> None:
+    laboratory = Good(tmp_path)
+    pilot, last = fly(tmp_path, laboratory)
+    kinds = [line["kind"] for line in pilot.journal.of("decided")]
+    assert kinds[-3:] == ["apply", "verify", "stop"]
+    assert last.reached
+    assert "left as it is" in next(
+        line["says"] for line in pilot.journal.of("done") if "left_out" in line
+    )
+
+
 def test_a_fault_is_raised_and_the_same_session_is_gone_on_with(tmp_path: Path) -> None:
     with pytest.raises(DeviceError):
         fly(tmp_path, Simulated(tmp_path, lost_at=0))
