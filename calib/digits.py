@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import TypeGuard
 
 MOST = 15
@@ -44,7 +45,8 @@ class Digits:
         sign = "+" if signed else ""
         if self.last is None:
             return _unsigned_zero(format(value, f"{sign}.6g"))
-        shown = format(value * 10.0**-self.power, f"{sign}.{max(self.power - self.last, 0)}f")
+        scaled = Decimal(value).scaleb(-self.power)  # exact: what stands half way goes one way
+        shown = format(scaled, f"{sign}.{max(self.power - self.last, 0)}f")
         if self.last > self.power:  # an uncertainty of hundreds: zeros stand in place of digits
             shown = format(round(value, -self.last), f"{sign}.0f")
         return _unsigned_zero(shown) + (f"e{self.power:+03d}" if self.power else "")

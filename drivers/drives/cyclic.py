@@ -124,9 +124,6 @@ class Stream:
     def _run(self) -> None:
         due = time.monotonic()
         while not self._end.wait(max(due - time.monotonic(), 0.0)):
-            late = time.monotonic() - due
-            if late > self._period_s:
-                self._late.append(late)
             drives = self._bus.drives
             frames = []
             for drive, counts in zip(drives, self._step(), strict=True):
@@ -137,5 +134,8 @@ class Stream:
             except LinkLost as error:
                 self._bus.link.latch("link", error)
                 return
+            sent = time.monotonic()
+            if sent - due > self._period_s:
+                self._late.append(sent - due)
             # What was late shifts all that follows: two SYNCs are never nearer than half a period.
-            due = max(due + self._period_s, time.monotonic() + 0.5 * self._period_s)
+            due = max(due + self._period_s, sent + 0.5 * self._period_s)
