@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from app.errors import GateRefused, StoppedByOperator
+from app.lasting import Lasting
 from app.plain_data import printable
 from app.tasks import TASKS
 from calib.errors import BadInput
@@ -129,9 +130,12 @@ def pkmcal(context: click.Context, site: Path | None, folder: Path) -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and end the process with the exit code of how the job ended."""
-    for stream in (sys.stdout, sys.stderr):
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a code page without a sign ends no answer
+            if stream.isatty():
+                setattr(sys, name, Lasting(stream))
     sys.exit(run(arguments))
 
 

@@ -3,18 +3,18 @@
 import asyncio
 import os
 import signal
-import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import IO, Any, TextIO, cast
+from typing import Any
 
 import click
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn
 
 from app.answer import interactive
+from app.lasting import write_to_nobody
 from app.plain_data import printable
 from app.session import events as ev
 from app.session.kinds import KINDS
@@ -24,39 +24,6 @@ from app.show.spans import duration
 STOPS = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
-class Lasting:
-    """A stream that goes on when its terminal is gone: what is written then is lost.
-
-    A write can meet the closed terminal before its signal is heard; the stop that the signal asks
-    for must not end in that write.
-    """
-
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._stream, name)
-
-    def write(self, text: str) -> int:
-        """Write, or lose it."""
-        try:
-            return self._stream.write(text)
-        except OSError:
-            self._leave()
-            return len(text)
-
-    def flush(self) -> None:
-        """Bring it out, or lose it."""
-        try:
-            self._stream.flush()
-        except OSError:
-            self._leave()
-
-    def _leave(self) -> None:
-        with suppress(OSError):
-            _write_to_nobody([self._stream.fileno()])
-
-
 class ConsoleFace:
     """Watches a session's events and talks to the person at the terminal."""
 
@@ -64,8 +31,7 @@ class ConsoleFace:
         self._answer = answer
         self._often = False
         """Whether the step in work is of a kind that is too frequent to tell each end."""
-        lasting = cast(IO[str], Lasting(sys.stderr))
-        self._console = Console(file=lasting, quiet=quiet, highlight=False, soft_wrap=True)
+        self._console = Console(stderr=True, quiet=quiet, highlight=False, soft_wrap=True)
         self._progress = Progress(
             TextColumn("{task.completed:.0f} of {task.total:.0f}"),
             BarColumn(bar_width=24),
@@ -198,7 +164,7 @@ def stopping(stop: Callable[[], Any]) -> Iterator[None]:
 
     def handle(signum: int, frame: FrameType | None) -> None:
         if signal.Signals(signum).name == "SIGHUP":
-            _write_to_nobody(terminals)
+            write_to_nobody(terminals)
         loop.call_soon_threadsafe(begin)
 
     terminals = [descriptor for descriptor in (0, 1, 2) if os.isatty(descriptor)]
@@ -211,15 +177,6 @@ def stopping(stop: Callable[[], Any]) -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-def _write_to_nobody(terminals: Iterable[int]) -> None:
-    """Nobody reads a terminal that is gone, and writing to it would end the stop half-way."""
-    nobody = os.open(os.devnull, os.O_RDWR)
-    for descriptor in terminals:
-        with suppress(OSError):
-            os.dup2(nobody, descriptor)
-    os.close(nobody)
 
 
 def unattended(asked: bool) -> bool:

@@ -187,6 +187,34 @@ def test_a_closed_terminal_stops_the_machine_and_leaves_a_journal_to_resume(
 
 
 @pytest.mark.long
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no terminal hangs up here")
+def test_what_was_begun_with_nohup_goes_on_without_its_terminal(
+    mock_of: Callable[..., Mock], tmp_path: Path
+) -> None:
+    import pty
+
+    mock = mock_of("--smrs", "3")
+    site = str(mock.site_file(tmp_path))
+    command = ["measure", "--site", site, "--poses", two_poses(tmp_path), "--unattended"]
+    code = "from app.cli import main; main()"
+    child, terminal = pty.fork()
+    if child == 0:
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+        os.chdir(tmp_path)
+        os.execv(sys.executable, [sys.executable, "-c", code, *command, "--no-warm-up"])
+    seen = b""
+    deadline = time.monotonic() + 60.0
+    while b"session" not in seen:
+        assert time.monotonic() < deadline, seen
+        seen += os.read(terminal, 65536)
+    os.close(terminal)
+    _, status = os.waitpid(child, 0)
+    assert os.waitstatus_to_exitcode(status) == 0
+    (run,) = (tmp_path / "sessions").glob("*/run")
+    assert len((run / "points.csv").read_text(encoding="utf-8").splitlines()) >= 15
+
+
+@pytest.mark.long
 def test_a_refusing_gate_ends_with_5(mock_of: Callable[..., Mock], tmp_path: Path) -> None:
     site = str(mock_of("--smrs", "3").site_file(tmp_path))
     far = tmp_path / "far.csv"

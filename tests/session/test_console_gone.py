@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from app.console import Lasting
+from app.lasting import Lasting
 
 pty = pytest.importorskip("pty")
 
