@@ -24,6 +24,8 @@ CLEAR = float(np.log(1e-3))
 """log p of a test of structure, on its own, from which noise is asked for in an adequate model."""
 SCATTER = 3.1
 """Standard deviations by which chi-square is off, from which the same holds."""
+SEARCHED = 12.0
+"""What likelihood counts less for structure: it is the best of thousands of periods and ways."""
 ROUNDS = 3
 
 
@@ -45,8 +47,11 @@ def judge(fit: Fit, catalogue: Sequence[Effect], seed: int) -> RunDiagnosis:
     kept, found = _beside(problem, taking, white.diagnosis.joined)
     structure = white.diagnosis.structure
     if structure is not None and structure.log_evidence > 0.0:
-        beside = estimate(_enlarged(problem, (*kept, structure)), taking)
-        if structure.log_evidence + beside.gain > found.gain:
+        smaller = _enlarged(problem, kept)
+        larger = _enlarged(smaller, (structure,))
+        beside = estimate(larger, taking)
+        told = max(structure.log_evidence, _likelier(smaller, larger) - SEARCHED)
+        if told + _worth(beside) > _worth(found):
             found = beside
     answer = white
     for _ in range(ROUNDS):

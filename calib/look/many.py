@@ -30,6 +30,8 @@ LEFT = 1.3
 """Chi-square per degree of freedom that the account may leave."""
 CLEAR = 60.0
 """Fall by which the steps together must beat what is smooth."""
+WAVES = 6
+"""Half waves in a run of what sways slowly: a tide is no station that is moved and put back."""
 REFINED = 3
 """Times all sizes of actuators are found anew, the moments known: seen from the nominal machine,
 then by fits."""
@@ -175,7 +177,10 @@ def _sized(machine: Machine, run: Run, found: list[Found]) -> list[Found]:
 
 
 def _smooth(view: Fit) -> float:
-    """Fall of the cost by all nests off, actuators and a frame that drift: nothing that steps."""
+    """Fall of the cost by all nests off, actuators and a frame that drift: nothing that steps.
+
+    The frame as a series of cosines: stairs of three boxes are as near to a wave as it is to them.
+    """
     situation, rows = view.linear.situation, view.model.rows
     names = np.array(rows.nest_name, dtype=object)
     columns = [
@@ -188,9 +193,13 @@ def _smooth(view: Fit) -> float:
     if temperature is not None and np.all(np.isfinite(temperature)):
         shapes.append(temperature - temperature.mean())
     columns += [(situation.actuator_columns * shape)[:, :, view.accepted] for shape in shapes]
-    drift = rigid_motions(situation.point) * rows.progress
-    slow = np.einsum("ijn,kjn->kin", situation.whitener, drift)[:, :, view.accepted]
-    return float(scan(view, np.concatenate([*columns, slow])).fall[0])
+    span = max(float(np.ptp(rows.time_s)), 1e-9)
+    turns = np.pi * (rows.time_s - rows.time_s.min()) / span
+    motions = rigid_motions(situation.point)
+    drifts = [rows.progress, *(np.cos(m * turns) for m in range(1, WAVES + 1))]
+    slow = np.concatenate([motions * drift for drift in drifts])
+    columns.append(np.einsum("ijn,kjn->kin", situation.whitener, slow)[:, :, view.accepted])
+    return float(scan(view, np.concatenate(columns)).fall[0])
 
 
 def _nest_steps(view: Fit) -> float:
