@@ -21,10 +21,13 @@ something in their targets stay well below."""
 REMEDY = "Check cable and controller, then go on: the pose is commanded anew"
 
 
-def must_be_within_reach(machine: Machine, q: Sequence[float]) -> None:
+def must_be_within_reach(
+    machine: Machine, q: Sequence[float], homed: Sequence[bool] | None = None
+) -> None:
     """Refuse actuator values (mm, rad) farther outside the stroke than the stroke is long.
 
-    An actuator that was driven past its limits by hand is no more than that.
+    An actuator that was driven past its limits by hand is no more than that; one that has not been
+    ``homed`` counts from wherever it was switched on.
 
     Raises
     ------
@@ -33,6 +36,8 @@ def must_be_within_reach(machine: Machine, q: Sequence[float]) -> None:
     low, high = machine.q_limits.T
     stroke = high - low
     inside = (np.array(q) >= low - stroke) & (np.array(q) <= high + stroke)
+    if homed is not None:
+        inside |= ~np.array(homed)
     for actuator, value, good in zip(machine.actuators, q, inside, strict=True):
         if not good:
             raise ProtocolError(

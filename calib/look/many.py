@@ -2,7 +2,7 @@
 
 The steps are found one by one from the nominal machine, each with the geometry freed, which two
 steps at once would bend. The account holds if it leaves next to no misfit, and if nothing that is
-smooth in time or belongs to a nest would do as well.
+smooth in time, belongs to a nest or is a known effect would do as well.
 """
 
 from dataclasses import dataclass, replace
@@ -10,8 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.arrays import Array
+from calib.effects import catalogue
 from calib.effects.tracker import rigid_motions
 from calib.identify.fitting import Fit
+from calib.identify.signatures import effect_columns
 from calib.look.bent import SLOW_S
 from calib.look.boxes import Box, Sums
 from calib.look.gravity import weight_fall
@@ -30,6 +32,8 @@ LEFT = 1.3
 """Chi-square per degree of freedom that the account may leave."""
 CLEAR = 60.0
 """Fall by which the steps together must beat what is smooth."""
+UNBENT = 0.03
+"""Part of what is too much that a known effect is given: it is seen from the nominal machine."""
 WAVES = 6
 """Half waves in a run of what sways slowly: a tide is no station that is moved and put back."""
 REFINED = 3
@@ -77,7 +81,8 @@ def several_steps(machine: Machine, run: Run) -> tuple[list[Run], list[Remark]] 
     if any(_of_one_nest(before, one) for one in found):
         return None  # it was that nest that moved
     fall = excess(before) - max(excess(fitted), 0.0)
-    if fall < max(_smooth(before), _nest_steps(before)) + CLEAR:
+    known = _effects(before) + UNBENT * excess(before)
+    if fall < max(_smooth(before), _nest_steps(before), known) + CLEAR:
         return None
     return parts, _remarks(machine, run, found, fitted, before)
 
@@ -200,6 +205,17 @@ def _smooth(view: Fit) -> float:
     slow = np.concatenate([motions * drift for drift in drifts])
     columns.append(np.einsum("ijn,kjn->kin", situation.whitener, slow)[:, :, view.accepted])
     return float(scan(view, np.concatenate(columns)).fall[0])
+
+
+def _effects(view: Fit) -> float:
+    """Fall of the cost by the one known effect, without a moment or period, that explains most."""
+    asked = effect_columns(view, catalogue(view.model.rows.machine))
+    falls = [
+        float(scan(view, one.at(0)[:, :, view.accepted]).fall[0])
+        for one in asked
+        if len(one.trials) == 1
+    ]
+    return max(falls, default=0.0)
 
 
 def _nest_steps(view: Fit) -> float:

@@ -60,6 +60,7 @@ def test_what_was_driven_past_its_limits_by_hand_is_none_of_a_broken_wire() -> N
     machine = load_machine("hexapod")
     low, high = machine.q_limits.T
     must_be_within_reach(machine, high + 0.5 * (high - low))
+    must_be_within_reach(machine, [0.0] * 6, [False] * 6)  # switched on, and not homed yet
     for beyond in (low - 1.5 * (high - low), np.full(6, np.nan), np.full(6, 1e300)):
         with pytest.raises(ProtocolError, match=r"q1.*stroke"):
             must_be_within_reach(machine, beyond)

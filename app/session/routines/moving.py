@@ -130,7 +130,8 @@ async def take_stock(work: Work) -> None:
     """
     state = await work.controller.state()
     q = tuple(actuator.target for actuator in state.actuators)
-    must_be_within_reach(work.site.machine, q)
+    homed = [actuator.homed for actuator in state.actuators]
+    must_be_within_reach(work.site.machine, q, homed)
     last = work.journal.last_row()
     same = last is not None and all(abs(a - b) < _SAME for a, b in zip(q, last.q, strict=True))
     work.memory.q = q
