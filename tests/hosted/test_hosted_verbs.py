@@ -29,7 +29,7 @@ pytestmark = pytest.mark.long
 
 @pytest.fixture(params=KINDS)
 def station(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Path]:
-    with mock_station("hexapod", 5, 600.0, tmp_path, [request.param]) as site:
+    with mock_station("hexapod", 5, 300.0, tmp_path, [request.param]) as site:
         text = site.read_text(encoding="utf-8")  # a busy computer starves the mock for a second
         patient = text.replace("[controller]\n", "[controller]\nsilence_s = 10.0\n")
         site.write_text(patient, encoding="utf-8")
