@@ -173,6 +173,14 @@ def offered_effects(files: Iterable[Path], chosen: Iterable[Effect] = ()) -> lis
     return offered
 
 
+def own_effects(model: Path) -> dict[str, Effect]:
+    """A lab's own effects that a model file holds, by name; BadInput with file and place."""
+    return {
+        name: effect_from_text(text, f"{model}, own_effects.{name}")
+        for name, text in read_fit(model).own.items()
+    }
+
+
 def chosen_effects(machine: Machine, add: tuple[str, ...], model: Path | None) -> list[Effect]:
     """Effects of ``--model FILE`` and ``--add EFFECT``, each once, in that order.
 
@@ -180,14 +188,9 @@ def chosen_effects(machine: Machine, add: tuple[str, ...], model: Path | None) -
     """
     chosen: dict[str, Effect] = {}
     if model is not None:
-        saved = read_fit(model)
-        for name in saved.effects:
-            own = saved.own.get(name)
-            chosen[name] = (
-                effect_named(name, machine)
-                if own is None
-                else effect_from_text(own, f"{model}, own_effects.{name}")
-            )
+        own = own_effects(model)
+        for name in read_fit(model).effects:
+            chosen[name] = own.get(name) or effect_named(name, machine)
     for name in add:
         effect = (
             read_own_effect(Path(name)) if name.endswith(".toml") else effect_named(name, machine)

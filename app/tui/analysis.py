@@ -8,14 +8,12 @@ from typing import Any
 import numpy as np
 
 from app.analysis import looked_at, masked_rows
-from app.files.fits import read_fit
-from app.files.models import offered_effects
+from app.files.models import offered_effects, own_effects
 from app.files.runs import read_runs
 from app.jobs.remembering import remember_fit
 from app.tui.reading_lines import ReadingLine, lines_of_fit
 from calib.arrays import Array
 from calib.effects import Effect, effect_named
-from calib.formulas.effect_file import effect_from_text
 from calib.identify import Fit, fit_report
 from calib.identify.staged import fit_effects
 from calib.identify.starting import begin
@@ -58,11 +56,7 @@ class OwnEffects:
     def by_name(self) -> dict[str, Effect]:
         """Read them; raises BadInput with file and line."""
         found: dict[str, Effect] = {one.id: one for one in offered_effects(self.offers)}
-        if self.model is not None:
-            own = read_fit(self.model).own
-            place = f"{self.model}, own_effects"
-            found |= {name: effect_from_text(text, place) for name, text in own.items()}
-        return found
+        return found if self.model is None else found | own_effects(self.model)
 
 
 def load_named(

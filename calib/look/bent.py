@@ -14,7 +14,7 @@ from calib.identify.fitting import Fit
 from calib.look.digits import decimals_of
 from calib.look.gravity import weight_fall
 from calib.look.scan import excess, fit_of, scan
-from calib.look.seat_off import seat_columns
+from calib.look.seat_off import each_seat
 from calib.mechanism.description import Machine
 from calib.runs.record import Run
 from calib.runs.remark import Remark, ranges
@@ -96,13 +96,7 @@ def _slow(fitted: Fit, actuator: int) -> float:
 
 def _of_a_nest(fitted: Fit) -> float:
     """Fall by the one nest that is off throughout: read in turn, nests step like an actuator."""
-    names = np.array(fitted.model.rows.nest_name, dtype=object)
-    falls = [
-        float(scan(fitted, seat_columns(fitted, names == name, room=False)).fall[0])
-        for name in fitted.model.rows.runs[0].header.platform_nests
-        if np.any((names == name) & fitted.accepted)
-    ]
-    return max(falls, default=0.0)
+    return max((float(scan(fitted, one).fall[0]) for one in each_seat(fitted)), default=0.0)
 
 
 def slip_remark(fitted: Fit, found: Slip) -> Remark:

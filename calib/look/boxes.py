@@ -11,6 +11,7 @@ import numpy as np
 
 from calib.arrays import Array, IntArray
 from calib.identify.fitting import Fit
+from calib.look.scan import freed
 
 GRID = 60
 """Moments that are tried against one another."""
@@ -68,12 +69,9 @@ class Sums:
         mixed = self.mixed[last] - self.mixed[first]
         taken = self.taken[last] - self.taken[first]
         weights = weights - np.einsum("npk,npl->nkl", mixed, taken)
-        size = np.sqrt(np.maximum(np.einsum("nkk->nk", weights), 1e-300))
-        scaled = weights / size[:, :, None] / size[:, None, :] + 1e-6 * np.eye(size.shape[1])
-        beta = np.linalg.solve(scaled, (scores / size)[:, :, None])[:, :, 0]
-        fall = np.sum(beta * scores / size, axis=1)
+        fall, sizes = freed(weights, scores)
         at = int(np.argmax(fall))
-        return Box(int(first[at]), int(last[at]), float(fall[at]), (beta / size)[at])
+        return Box(int(first[at]), int(last[at]), float(fall[at]), sizes[at])
 
 
 def _summed(values: Array) -> Array:

@@ -18,7 +18,7 @@ from calib.look.bent import SLOW_S
 from calib.look.boxes import Box, Sums
 from calib.look.gravity import weight_fall
 from calib.look.scan import excess, fit_together, from_nominal, scan, whitened, with_the_excluded
-from calib.look.seat_off import seat_columns
+from calib.look.seat_off import each_seat
 from calib.look.several import split
 from calib.mechanism.description import Machine
 from calib.runs.record import Run
@@ -187,12 +187,7 @@ def _smooth(view: Fit) -> float:
     The frame as a series of cosines: stairs of three boxes are as near to a wave as it is to them.
     """
     situation, rows = view.linear.situation, view.model.rows
-    names = np.array(rows.nest_name, dtype=object)
-    columns = [
-        seat_columns(view, names == name, room=False)
-        for name in rows.runs[0].header.platform_nests
-        if np.any((names == name) & view.accepted)
-    ]
+    columns = list(each_seat(view))
     shapes = [rows.progress, *(np.exp(-rows.time_s / tau) for tau in SLOW_S)]
     temperature = rows.channels.get("structure_temp_C")
     if temperature is not None and np.all(np.isfinite(temperature)):
@@ -220,14 +215,7 @@ def _effects(view: Fit) -> float:
 
 def _nest_steps(view: Fit) -> float:
     """Fall of the cost by the one nest of the platform that moves at some moment, or is off."""
-    rows = view.model.rows
-    names = np.array(rows.nest_name, dtype=object)
-    falls = [0.0]
-    for name in rows.runs[0].header.platform_nests:
-        own = names == name
-        if np.any(own & view.accepted):
-            falls += scan(view, seat_columns(view, own, room=False)).fall.tolist()
-    return max(falls)
+    return max((float(scan(view, one).fall.max()) for one in each_seat(view)), default=0.0)
 
 
 def _remarks(

@@ -122,11 +122,16 @@ def scan(fitted: Fit, columns: Array, *, early: bool = False) -> Scan:
         sums = [way[-1 if early else 0].copy() for way in ways]
         weights, scores, mixed = ways
         weights -= np.einsum("npk,pq,nql->nkl", mixed, fitted.step_covariance, mixed, optimize=True)
-        size = np.sqrt(np.maximum(np.einsum("nkk->nk", weights), 1e-300))
-        scaled = weights / size[:, :, None] / size[:, None, :] + 1e-6 * np.eye(k)
-        beta = np.linalg.solve(scaled, (scores / size)[:, :, None])[:, :, 0]
-        fall[part], sizes[part] = np.sum(beta * scores / size, axis=1), beta / size
+        fall[part], sizes[part] = freed(weights, scores)
     return Scan(fall, sizes)
+
+
+def freed(weights: Array, scores: Array) -> tuple[Array, Array]:
+    """Fall s^T V^-1 s (n,) by columns of weights V (n, k, k) and scores s (n, k); sizes (n, k)."""
+    size = np.sqrt(np.maximum(np.einsum("nkk->nk", weights), 1e-300))
+    scaled = weights / size[:, :, None] / size[:, None, :] + 1e-6 * np.eye(size.shape[1])
+    beta = np.linalg.solve(scaled, (scores / size)[:, :, None])[:, :, 0]
+    return np.sum(beta * scores / size, axis=1), beta / size
 
 
 def _sum_up(values: Array, before: Array, *, early: bool) -> None:

@@ -1,5 +1,6 @@
 """A nest that is off as one, in the whole run or a part, by what a fit leaves."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -96,6 +97,15 @@ def seat_columns(fitted: Fit, which: BoolArray, *, room: bool) -> Array:
     turned = unit if room else np.stack([rotate(situation.rotation, one) for one in unit])
     whitened = np.einsum("ijn,kjn->kin", situation.whitened_frame, turned)
     return np.asarray(whitened[:, :, fitted.accepted], dtype=np.float64)
+
+
+def each_seat(fitted: Fit) -> Iterator[Array]:
+    """Columns (3, 3, A) of moving each nest of the platform that was read, in its frame."""
+    rows = fitted.model.rows
+    names = np.array(rows.nest_name, dtype=object)
+    for name in rows.runs[0].header.platform_nests:
+        if np.any((names == name) & fitted.accepted):
+            yield seat_columns(fitted, names == name, room=False)
 
 
 def reseated(machine: Machine, run: Run, fitted: Fit, seat: Seat) -> tuple[Run, Remark]:

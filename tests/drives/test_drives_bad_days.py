@@ -5,6 +5,7 @@ import gc
 import json
 import os
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -99,6 +100,22 @@ async def test_a_frame_that_is_too_short_is_dropped_and_is_no_fault(bare):
     await until(lambda: any("0x8210" in alarm.what for alarm in bare.alarms))
     motors.check()
     assert (await motors.state()).enabled
+
+
+async def test_a_stop_from_another_thread_needs_no_event_loop(bare):
+    motors = await bare.ready(speed=(4.0,) * 6)
+    await motors.move_actuators(FAR)
+    await until(lambda: bare.moving)
+    threading.Thread(target=motors.stop_at_once).start()
+    deadline = time.monotonic() + 20.0
+    while bare.moving:  # the event loop does not come to its turn meanwhile
+        assert time.monotonic() < deadline
+        time.sleep(0.005)  # noqa: ASYNC251
+    with pytest.raises(DeviceFault, match="stopped"):
+        await motors.wait_arrived(20.0)
+    await motors.stop()
+    await motors.close()
+    motors.stop_at_once()  # nothing is there any more, and nothing is raised
 
 
 async def test_a_drive_without_a_pdo_for_its_controlword_is_stopped_by_sdo(bare):

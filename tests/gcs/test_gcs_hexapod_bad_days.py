@@ -1,6 +1,8 @@
 """What goes wrong on the way to a closed hexapod, and with it: faults in words, never a hang."""
 
 import asyncio
+import threading
+import time
 from collections.abc import AsyncIterator
 
 import pytest
@@ -74,6 +76,19 @@ async def test_a_stop_ends_a_move_and_holds_the_platform(bench: HexapodBench) ->
         await bench.driver.move_pose(HOME)
     await bench.driver.enable()
     await bench.driver.move_pose(HOME)
+
+
+async def test_a_stop_from_another_thread_needs_no_event_loop(bench: HexapodBench) -> None:
+    await slow(bench)
+    threading.Thread(target=bench.driver.stop_at_once).start()
+    deadline = time.monotonic() + 20.0
+    while bench.world.moving:  # the event loop does not come to its turn meanwhile
+        assert time.monotonic() < deadline
+        time.sleep(0.005)  # noqa: ASYNC251
+    with pytest.raises(DeviceFault, match="stopped"):
+        await bench.driver.wait_arrived(20.0)
+    await bench.driver.close()
+    bench.driver.stop_at_once()  # nothing is there any more, and nothing is raised
 
 
 async def test_somebody_else_stops_it(bench: HexapodBench) -> None:

@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from bench._first_look import clean
 from bench.mistakes import WRONG, said_of
 from bench.mistakes.clean import clean_run, machine_named
 from bench.mistakes.variations import VARIATIONS
@@ -73,6 +74,11 @@ def test_what_is_seen_against_the_machine_is_named(number):
         assert outcome != "silent", (machine, order)
     else:
         assert outcome not in WRONG, (machine, order, words)
+
+
+@pytest.mark.parametrize("seed", [90289, 90631])
+def test_joints_turned_are_no_station_that_moved_twice(seed: int) -> None:
+    assert clean(seed) == ("joint-azimuth", ())
 
 
 @pytest.mark.parametrize(

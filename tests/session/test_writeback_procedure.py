@@ -76,8 +76,9 @@ async def test_apply_corrects_the_machine_and_undo_brings_the_old_set_back(
         await station.controller.reload_parameters()  # what survives a power cycle
         now = await compare_with_known(station.site, station.controller)
         assert now.values["leg1.B_x"] == found.estimates["leg1.B_x"].value
-        with pytest.raises(GateRefused, match="holds this fit already"):
+        with pytest.raises(GateRefused, match="holds this fit already") as refused:
             await job(station, found, tmp_path).propose()
+        assert refused.value.nothing_to_gain
         assert found.controller_serial == station.controller.identity.serial
         await undo(station, applied.snapshot, "undo")
         back = await compare_with_known(station.site, station.controller)
