@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from bench._blind_noise import noisy
+from bench._blind_noise import noisy, widened
 from mocks.hidden import effects, effects_of
 from mocks.hidden.effect import Site, Table
 from mocks.hidden.table import Hidden
@@ -78,7 +78,10 @@ def build(case: Case, poses: object) -> tuple[SimulatedRun, Table]:
     for name, size in zip(case.effects, case.sizes, strict=True):
         hidden |= _scaled(plan, empty, name, size, rng)
     run = simulate(replace(plan, hidden=Hidden(hidden)))
-    if case.noise:
+    if case.noise.startswith("added:"):
+        run = simulate(replace(plan, hidden=Hidden(hidden), noise_mm=None))
+        run = replace(run, xyz=widened(run, case.noise, SIGMA_MM, case.seed))
+    elif case.noise:
         quiet = simulate(replace(plan, hidden=Hidden(hidden), noise_mm=NEXT_TO_NONE_MM))
         run = replace(run, xyz=noisy(quiet, case.noise, SIGMA_MM, case.seed))
     return run, hidden

@@ -23,7 +23,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from bench._blind_cases import Case, build, draw_cases, draw_nulls
+from bench._blind_cases import SIGMA_MM, Case, build, draw_cases, draw_nulls
 from bench._intervals import share
 from bench.blind import machine_named, poses_of
 from calib.discover.diagnosis import RunDiagnosis, diagnose_fit
@@ -44,6 +44,10 @@ CONDITIONS = {
     "t:5": "Student's t of 5 degrees of freedom",
     "scale:0.8": "0.8 times what is stated",
     "scale:1.5": "1.5 times",
+    "nest:1.6": "one nest 1.6 times what is stated",
+    "along:1.5": "1.5 times along the beam",
+    "added:1": "5 um beside a tracker's covariances",
+    "range:0.6": "beside what is stated 3 um/m of range",
 }
 BEGIN, END = "<!-- bench noise: begin -->", "<!-- bench noise: end -->"
 
@@ -123,7 +127,19 @@ def true_noise(condition: str, fit: Fit) -> Noise | None:
         return Noise(scale=float(amount))
     if name == "ar":
         return Noise(tau_s=-fit.taking.usual_gap_s / float(np.log(float(amount))), by_row=True)
+    own = {
+        "nest": (f"nest {_first_nest(fit)}", 1.0), "along": ("along", 1.0),
+        "added": ("added", 1000.0 * SIGMA_MM), "range": ("range", 1000.0 * SIGMA_MM),
+    }  # fmt: skip
+    if name in own:
+        component, unit = own[name]
+        return Noise(scatter=((component, unit * float(amount)),))
     return Noise() if name == "white" else None
+
+
+def _first_nest(fit: Fit) -> str:
+    rows = fit.model.rows
+    return next(name for name, on in zip(rows.nest_name, rows.on_platform, strict=True) if on)
 
 
 def significant(answer: RunDiagnosis, effect: str) -> bool:
@@ -145,7 +161,7 @@ def asked(
             noise = "" if condition == "white" else condition
             if k < runs:
                 yield clean, "clean", replace(nulls[k], noise=noise), condition
-            if k < len(singles) and condition.partition(":")[0] in ("white", "ar", "scale"):
+            if k < len(singles) and condition.partition(":")[0] not in ("walk", "t"):
                 yield hidden, "hidden", replace(singles[k], noise=noise), condition
 
 

@@ -7,6 +7,7 @@ with that noise, and what was noise is no longer called for. Structure of unknow
 against noise by its evidence: where it says more than noise would, noise is what is left beside it.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -17,8 +18,7 @@ from calib.effects.component import Effect
 from calib.evidence.findings import Joined
 from calib.evidence.problem import LinearProblem
 from calib.identify.fitting import Fit, with_noise
-from calib.noise import Found, Taking, estimate
-from calib.noise.estimate import DEMANDED
+from calib.noise import Found, Taking, estimate, points_to_scatter
 
 CLEAR = float(np.log(1e-3))
 """log p of a test of structure, on its own, from which noise is asked for in an adequate model."""
@@ -105,7 +105,7 @@ def _likelier(problem: LinearProblem, larger: LinearProblem) -> float:
 
 def _worth(found: Found) -> float:
     """Log of what noise explains, less what the freedom of its components does by chance."""
-    return found.gain - DEMANDED * len(found.components)
+    return found.gain - found.price
 
 
 def inflation(white: Fit, noisy: Fit) -> float:
@@ -120,7 +120,9 @@ def _suspicious(white: RunDiagnosis) -> bool:
         return False
     off = abs(fit.chi2 - fit.dof) / np.sqrt(2.0 * fit.dof)
     alike = min(white.diagnosis.quadratic_log_p, default=0.0)
-    return not white.diagnosis.adequate or off > SCATTER or alike < CLEAR
+    if not white.diagnosis.adequate or off > SCATTER or alike < CLEAR:
+        return True
+    return math.log(max(points_to_scatter(fit.problem, fit.taking), 1e-300)) < CLEAR
 
 
 def _enlarged(problem: LinearProblem, joined: Sequence[Joined]) -> LinearProblem:

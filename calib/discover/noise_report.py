@@ -8,6 +8,7 @@ import numpy as np
 from calib.digits import plus_minus
 from calib.discover.diagnosis import RunDiagnosis
 from calib.noise import Component
+from calib.noise.scatter import ACROSS, ADDED, ADDED_ANGLE, ALONG, RANGE
 
 CLEAR = 1e-3
 """p-value up to which a component is spoken of; a weaker one only counts in judging effects."""
@@ -32,8 +33,10 @@ def noise_words(found: RunDiagnosis) -> str:
 
 def _entry(found: RunDiagnosis, one: Component) -> dict[str, Any]:
     size, unit = _scale(found, one)
+    name, of = _named(one)
     return {
-        "name": one.name,
+        "name": name,
+        "of_what": of,
         "value": size * one.value,
         "sigma": size * one.sigma if math.isfinite(one.sigma) else None,
         "unit": unit,
@@ -42,34 +45,73 @@ def _entry(found: RunDiagnosis, one: Component) -> dict[str, Any]:
     }
 
 
+def _named(one: Component) -> tuple[str, str]:
+    """Name of a component for data, and of what it is."""
+    if one.name in ("correlated", "walk", "visit", "scale"):
+        return one.name, ""
+    if one.name in (ADDED, ADDED_ANGLE, RANGE):
+        return ("range" if one.name == RANGE else "added"), _ADDED[one.name][0]
+    return "scale-of", f"{one.name} the beam" if one.name in (ALONG, ACROSS) else one.name
+
+
 def _scale(found: RunDiagnosis, one: Component) -> tuple[float, str]:
     """Factor and unit of a component's value: s, a ratio, or the first actuator's unit."""
     if one.name == "correlated":
         return 1.0, "s"
-    if one.name in ("scale", "walk"):
+    if one.name in _ADDED:
+        return 1.0, _ADDED[one.name][1]
+    if one.name != "visit":
         return 1.0, "1"
     axis = found.fit.model.rows.machine.axes[0]
     return axis.usual_error, axis.unit
 
 
+_ADDED = {ADDED: ("lengths", "um"), ADDED_ANGLE: ("angles", "arcsec"), RANGE: ("lengths", "um/m")}
+"""Of what readings something is added to the scatter, and its unit."""
+
+
 def _says(found: RunDiagnosis, one: Component) -> str:
-    size, unit = _scale(found, one)
-    if one.name == "correlated":
-        noise = found.noise.noise
-        alike = noise.share * float(np.exp(-found.fit.taking.usual_gap_s / one.value))
+    if one.name in ("correlated", "walk"):
+        return _in_time(found, one)
+    if one.name == "visit":
+        return _of_visits(found, one)
+    if one.name == "scale":
         return (
-            f"the noise is correlated over {_time(one.value, one.sigma)} "
-            f"({alike:.2f} between successive readings)"
+            f"readings scatter {plus_minus(one.value, one.sigma)} times as much as sx, sy, sz say"
         )
+    name, of = _named(one)
+    if name == "added":
+        return (
+            f"white noise of {plus_minus(one.value, one.sigma, _ADDED[one.name][1])} comes on top "
+            f"of what is stated of {of}"
+        )
+    if name == "range":
+        return (
+            "the scatter grows with range, beyond what is stated, by "
+            f"{plus_minus(one.value, one.sigma, 'um/m')} an axis"
+        )
+    times = f"scatter {plus_minus(one.value, one.sigma)} times what is stated"
+    if one.name in (ALONG, ACROSS):
+        return f"{of} readings {times}"
+    return f"readings of the {of} {times}"
+
+
+def _in_time(found: RunDiagnosis, one: Component) -> str:
     if one.name == "walk":
         return (
             f"the noise wanders by {plus_minus(one.value, one.sigma)} sigma from one reading to "
             "the next, and does not come back within the run"
         )
-    if one.name == "scale":
-        return (
-            f"readings scatter {plus_minus(one.value, one.sigma)} times as much as sx, sy, sz say"
-        )
+    noise = found.noise.noise
+    alike = noise.share * float(np.exp(-found.fit.taking.usual_gap_s / one.value))
+    return (
+        f"the noise is correlated over {_time(one.value, one.sigma)} "
+        f"({alike:.2f} between successive readings)"
+    )
+
+
+def _of_visits(found: RunDiagnosis, one: Component) -> str:
+    size, unit = _scale(found, one)
     factor, unit = (1000.0, "um") if unit == "mm" else (1e6, "urad")
     value, sigma = factor * size * one.value, factor * size * one.sigma
     return (

@@ -272,7 +272,8 @@ def _of_physics(
             )
         if told:
             excluded = excluded.removeprefix(" As to noise:")
-            return f"Nothing else is missing:{excluded}"
+            loose = loose_references(found.fit)
+            return f"Nothing else is missing:{excluded}" + (f" {loose}." if loose else "")
         if loose := loose_references(found.fit):
             return f"Nothing is missing that these readings show. {loose}.{excluded}"
         return f"Nothing is missing: the model explains the readings to their noise.{excluded}"

@@ -11,6 +11,7 @@ from calib.evidence.problem import LinearProblem
 from calib.identify.optimum import optimise
 from calib.identify.readings import MASKED, BadReading, strays
 from calib.identify.starting import bad_reading, begin
+from calib.identify.taking import noise_covariance, taken
 from calib.mechanism.rigid import euler_rates, to_euler
 from calib.model.prediction import Model
 from calib.model.state import Linearised, State
@@ -77,13 +78,7 @@ class Fit:
 
     def taking_of(self, kept: BoolArray) -> Taking:
         """How readings (N,) were taken."""
-        rows = self.model.rows
-        usual = np.array([axis.usual_error for axis in rows.machine.axes])
-        columns = self.linear.situation.actuator_columns * rows.on_platform
-        visit = np.where(rows.on_platform, rows.path.stop[rows.at], -1)
-        motions = (usual[:, None, None] * columns)[:, :, kept]
-        live = None if rows.sensed is None else rows.live[:, kept]
-        return Taking(rows.run[kept], rows.time_s[kept], visit[kept], motions, live)
+        return taken(self.linear, kept)
 
     @cached_property
     def prior_precision(self) -> Array:
@@ -191,8 +186,15 @@ class Fit:
 def noise_variance(fit: Fit, which: BoolArray) -> float:
     """Sum over readings of the variance of their noise, whatever they share of it, mm^2."""
     rows, noise = fit.model.rows, fit.noise
-    variances = np.where(rows.in_millimetres, np.einsum("iin->in", rows.covariance), 0.0)
-    total = noise.scale**2 * float(np.sum(variances[:, which]))
+    told = rows.in_millimetres[:, which]
+    if noise.scatter:
+        root = rows.unwhitener[:, :, which]
+        own = noise_covariance(fit.linear, noise, which)
+        variances = np.einsum("ijn,jkn,ikn->in", root, own, root) * told
+        total = float(np.sum(variances))
+    else:
+        variances = np.where(rows.in_millimetres, np.einsum("iin->in", rows.covariance), 0.0)
+        total = noise.scale**2 * float(np.sum(variances[:, which]))
     if noise.visit > 0.0:
         usual = noise.visit * np.array([axis.usual_error for axis in rows.machine.axes])
         moved = rows.in_mm(

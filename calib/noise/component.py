@@ -2,20 +2,22 @@
 
 A reading's noise, whitened by its own stated covariance, is
 
-    n = scale (sqrt(1 - share) w + sqrt(share) z) + B u
+    n = R scale (sqrt(1 - share) w + sqrt(share) z) + B u
 
-with w white, z an Ornstein-Uhlenbeck process of each whitened axis, correlated by exp(-dt / tau)
+with R R^T = M what the reading's own sigmas must be corrected by (:mod:`calib.noise.scatter`),
+w white, z an Ornstein-Uhlenbeck process of each whitened axis, correlated by exp(-dt / tau)
 between readings dt apart in one run (or, by row, as if all successive ones were equally far apart:
 an autoregressive process of first order), and u one error of every actuator for each visit of a
 pose, in usual errors of the axes (B their displacements of the reading): a machine that does not
 repeat.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from calib.arrays import Array, BoolArray, IntArray
+from calib.noise.scatter import Scatter, Sizes
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,8 @@ class Noise:
     step : float
         Where what is correlated wanders without fading (``tau_s`` is far beyond the run): its steps
         over the usual gap, in white sigmas. 0 where it fades.
+    scatter : tuple of (str, float)
+        Sizes by which the readings' own sigmas are to be corrected, by name.
     """
 
     scale: float = 1.0
@@ -45,6 +49,7 @@ class Noise:
     visit: float = 0.0
     by_row: bool = False
     step: float = 0.0
+    scatter: Sizes = ()
 
     @property
     def narrow(self) -> float:
@@ -68,6 +73,8 @@ class Taking:
         Whitened displacement of each reading by a usual error of each actuator.
     live : (3, A) bool, optional
         Components that the readings hold, if not all.
+    scatter : Scatter
+        What the scatter of the readings may hang on.
     """
 
     run: IntArray
@@ -75,6 +82,7 @@ class Taking:
     visit: IntArray
     motions: Array
     live: BoolArray | None = None
+    scatter: Scatter = field(default_factory=Scatter)
 
     @property
     def alike(self) -> bool:
@@ -118,12 +126,9 @@ class Taking:
         spans = [float(np.ptp(self.time_s[self.run == run])) for run in np.unique(self.run)]
         return max(spans, default=0.0)
 
-    def take(self, which: Array | IntArray) -> "Taking":
-        """The same of some readings."""
-        return Taking(
-            self.run[which], self.time_s[which], self.visit[which], self.motions[:, :, which],
-            None if self.live is None else self.live[:, which],
-        )  # fmt: skip
+    def corrected(self, inverse: Array) -> "Taking":
+        """The same readings in other sigmas: whitened by ``inverse`` (3, 3, A) once more."""
+        return replace(self, motions=np.einsum("ijn,ujn->uin", inverse, self.motions))
 
     def variance_by_visit(self, noise: Noise) -> Array:
         """Covariance (3, 3, A) of the whitened readings by the machine's repeatability alone."""

@@ -1,15 +1,10 @@
 """Which components of noise the readings demand: restricted maximum likelihood.
 
-With the whitened derivatives J of everything fitted, priors' precision Lambda, the residual e of
-the fit and a covariance C of the noise, the fitted unknowns integrated out (Patterson and Thompson
-1971; the priors beside it as in a mixed model),
-
-    -2 log L = log det C + log det (J C^-1 J^T + Lambda) + min over d of
-               |C^-1/2 (e - J^T d)|^2 + (D + d)^T Lambda (D + d)
-
-where Lambda D = J e at the optimum of the fit. Components join one by one while the likelihood
-rises by enough; so noise that a missing effect imitates is not taken for one where that effect's
-columns are among J.
+Components join one by one while the likelihood rises by enough; so noise that a missing effect
+imitates is not taken for one where that effect's columns are among those of the fit. Of what the
+scatter of the readings may hang on (see :mod:`calib.noise.scatter`) only those are tried that a
+score test points to; what they gain is judged against the tails that the readings have, and against
+the best of as many by chance.
 """
 
 import math
@@ -22,8 +17,8 @@ from calib.arrays import Array
 from calib.chance import chi2_above
 from calib.evidence.problem import LinearProblem
 from calib.noise.component import WHITE, Noise, Taking
-from calib.noise.whitening import Whitening
-from calib.scaled import Scaled, normal_matrix
+from calib.noise.likelihood import Likelihood, spread
+from calib.noise.scatter import tails, uneven
 
 DEMANDED = 1.5
 """Rise of the log likelihood from which a component counts in judging what else is missing."""
@@ -31,6 +26,8 @@ RESCALED = 4.8
 """The same of the scale of the stated sigmas: these are trusted unless clearly wrong."""
 FAINT = 0.3
 """The same below which a component is not tried again beside others."""
+UNEVEN = 5.41
+"""The same of one component of scatter (p 0.001); of many, more by the log of how many."""
 SHARED = 2.0
 """The same of a white part beside the correlated one."""
 FADING, WANDERING = ("correlated", "successive"), ("walk", "walk-by-row")
@@ -39,17 +36,18 @@ TIED = (*FADING, *WANDERING)
 """One or the other."""
 PARTS = (*TIED, "visit", "scale")
 SAID = {"successive": "correlated", "walk-by-row": "walk"}
-WANDERED = 10.0
-"""Time constant of what wanders, in lengths of a run: within the run it does not fade."""
+POINTED, TRIED = 2.5, 2
+"""Standard deviations of the score from which a component of scatter is tried; how many at most."""
 
 
 @dataclass(frozen=True)
 class Component:
     """A component of the noise.
 
-    ``name`` correlated, walk, visit or scale; ``value`` s, stated sigmas from one reading to the
-    next, usual errors, or a ratio; ``sigma`` standard uncertainty of the value; ``p_value`` of
-    having none.
+    ``name`` correlated, walk, visit, scale, or one of :class:`calib.noise.scatter.Scatter`;
+    ``value`` s, stated sigmas from one reading to the next, usual errors, a ratio (of a group or
+    direction: over what is stated, the overall scale in it), um, arcsec, or um per metre;
+    ``sigma`` standard uncertainty of the value; ``p_value`` of having none.
     """
 
     name: str
@@ -60,64 +58,16 @@ class Component:
 
 @dataclass(frozen=True)
 class Found:
-    """What noise the readings demand; ``gain`` is the rise of the log likelihood by all of it."""
+    """What noise the readings demand.
+
+    ``gain`` is the rise of the log likelihood by all of it, ``price`` what its freedom does by
+    chance.
+    """
 
     noise: Noise = WHITE
     gain: float = 0.0
     components: tuple[Component, ...] = ()
-
-
-class _Likelihood:
-    """-log L of one problem, without its constant."""
-
-    def __init__(self, problem: LinearProblem, taking: Taking) -> None:
-        self._residual = problem.residual.reshape(1, 3, -1)
-        self._jacobian = problem.jacobian.reshape(problem.jacobian.shape[0], 3, -1)
-        self._precision = problem.prior_precision
-        self._pull = problem.jacobian @ problem.residual
-        self._taking = taking
-        shortest = np.log(0.2 * taking.usual_gap_s)
-        self.low = {
-            "correlated": shortest, "successive": shortest, "visit": np.log(0.02),
-            "walk": np.log(0.02), "walk-by-row": np.log(0.02), "scale": np.log(0.2), "share": -4.0,
-        }  # fmt: skip
-        longest = max(0.5 * taking.span_s, 2.0 * taking.usual_gap_s)
-        self.high = {
-            "correlated": np.log(longest), "successive": np.log(longest),
-            "visit": np.log(10.0), "walk": np.log(3.0), "walk-by-row": np.log(3.0),
-            "scale": np.log(20.0), "share": 6.0,
-        }  # fmt: skip
-
-    def at(self, parts: Sequence[str], logs: Sequence[float]) -> float:
-        return self.of(self.noise(parts, logs))
-
-    def noise(self, parts: Sequence[str], logs: Sequence[float]) -> Noise:
-        clipped = {
-            part: float(np.clip(log, self.low[part], self.high[part]))
-            for part, log in zip(parts, logs, strict=True)
-        }
-        scale = math.exp(clipped.get("scale", 0.0))
-        visit = math.exp(clipped["visit"]) if "visit" in clipped else 0.0
-        by_row = "successive" in clipped or "walk-by-row" in clipped
-        step = clipped.get("walk", clipped.get("walk-by-row"))
-        if step is not None:
-            gap, tau = self._taking.usual_gap_s, WANDERED * self._taking.span_s
-            reach = math.exp(2.0 * step) * tau / (2.0 * gap)
-            wide = scale * math.sqrt(1.0 + reach)
-            return Noise(wide, tau, reach / (1.0 + reach), visit, by_row, math.exp(step))
-        log_tau = clipped.get("correlated", clipped.get("successive"))
-        share = 1.0 / (1.0 + math.exp(-clipped["share"])) if "share" in clipped else 1.0
-        return Noise(scale, 0.0 if log_tau is None else math.exp(log_tau), share, visit, by_row)
-
-    def of(self, noise: Noise) -> float:
-        whitening = Whitening(self._taking, noise)
-        jacobian = whitening.apply(self._jacobian).reshape(self._jacobian.shape[0], -1)
-        residual = whitening.apply(self._residual).reshape(-1)
-        normal = Scaled.of(normal_matrix(jacobian, self._precision), least=1e-12)
-        step = normal.half_solved(jacobian @ residual - self._pull)
-        log_normal = 2.0 * float(np.sum(np.log(np.diag(normal.factor)) - np.log(normal.scale)))
-        square = float(residual @ residual) - float(step @ step)
-        return 0.5 * (whitening.log_det + log_normal + square)
+    price: float = 0.0
 
 
 def estimate(problem: LinearProblem, taking: Taking, *, least: float = DEMANDED) -> Found:
@@ -131,32 +81,119 @@ def estimate(problem: LinearProblem, taking: Taking, *, least: float = DEMANDED)
     least : float
         Rise of the log likelihood that correlation and visits must bring.
     """
-    likelihood = _Likelihood(problem, taking)
-    needed = dict.fromkeys(PARTS, least) | {"scale": max(least, RESCALED)}
+    likelihood = Likelihood(problem, taking)
+    bar = _Bar(likelihood, taking, least)
     now = white = _Sizes((), (), likelihood.of(WHITE))
     gains: dict[str, float] = {}
     left = [part for part in PARTS if part != "visit" or np.any(taking.visit >= 0)]
     if not taking.alike:
         left = [part for part in left if part not in TIED]
-    while left:
+    while True:
         fading = [part for part in left if part not in WANDERING]
         offers = {part: _joined(likelihood, now, part) for part in fading}
         if any(now.value - offers[part].value > least for part in FADING if part in offers):
             offers |= {part: _joined(likelihood, now, part) for part in WANDERING}
+        plain = tuple(offers)
+        offers |= {part: _joined(likelihood, now, part) for part in _pointed(likelihood, now, bar)}
         rise = {part: now.value - offer.value for part, offer in offers.items()}
-        best = max(rise, key=lambda part: rise[part] - needed[part])
-        if rise[best] <= needed[best]:
+        over = {
+            part: rise[part] - bar.price(part)
+            for part, offer in offers.items()
+            if rise[part] > bar.of(part, offer)
+        }
+        if not over:
             break
+        best = max(over, key=lambda part: over[part])
         now, gains[best] = offers[best], rise[best]
         taken = TIED if best in TIED else (best,)
-        left = [part for part in rise if part not in taken and rise[part] > FAINT]
+        left = [part for part in plain if part not in taken and rise[part] > FAINT]
     if set(FADING) & set(now.parts):
         wider = _joined(likelihood, now, "share")
         now = wider if now.value - wider.value > SHARED else now
+    now = _pruned(likelihood, now, bar)
     if not now.parts:
         return Found()
+    components = _components(likelihood, now, gains, bar)
+    price = DEMANDED * len(components) + bar.chosen * len(bar.own(now.parts))
     noise = likelihood.noise(now.parts, now.logs)
-    return Found(noise, white.value - now.value, _components(likelihood, now, gains))
+    return Found(noise, white.value - now.value, components, price)
+
+
+def points_to_scatter(problem: LinearProblem, taking: Taking) -> float:
+    """p-value of the score test that all readings scatter alike, whatever they state; no search."""
+    likelihood = Likelihood(problem, taking)
+    if not likelihood.uneven:
+        return 1.0
+    far = uneven(*likelihood.left(WHITE), taking.scatter, likelihood.uneven)
+    return min(1.0, far.size * math.erfc(float(np.max(np.abs(far))) / math.sqrt(2.0)))
+
+
+class _Bar:
+    """How much a component must raise the likelihood."""
+
+    def __init__(self, likelihood: Likelihood, taking: Taking, least: float) -> None:
+        self._likelihood, self._taking = likelihood, taking
+        self._needed = dict.fromkeys(PARTS, least) | {"scale": max(least, RESCALED)}
+        self._uneven = frozenset(likelihood.uneven)
+        self.chosen = math.log(max(len(self._uneven), 1))
+
+    def own(self, parts: Sequence[str]) -> list[str]:
+        """Those that are of single readings' scatter."""
+        return [part for part in parts if part in self._uneven]
+
+    def of(self, part: str, offer: "_Sizes") -> float:
+        """Rise from which a component counts that has led to ``offer``."""
+        if part not in self._uneven:
+            return self._needed[part]
+        return (UNEVEN + self.chosen) * self.heavy(offer)
+
+    def price(self, part: str) -> float:
+        """What a rise counts less by, where several components would do."""
+        return DEMANDED + self.chosen if part in self._uneven else self._needed[part]
+
+    def heavy(self, sizes: "_Sizes") -> float:
+        """Variance of the readings' squares over that of normal ones."""
+        residual, _ = self._likelihood.left(self._likelihood.noise(sizes.parts, sizes.logs))
+        return tails(residual)
+
+    def chance(self, part: str, gain: float, heavy: float) -> float:
+        """Probability of such a rise where there is none of it.
+
+        Chi-square of one; from its edge where a size can only be positive.
+        """
+        if part not in self._uneven:
+            return float(0.5 * chi2_above(1.0, 2.0 * gain))
+        sides = 0.5 if self._taking.scatter.is_added(part) else 1.0
+        return min(1.0, len(self._uneven) * sides * float(chi2_above(1.0, 2.0 * gain / heavy)))
+
+
+def _pointed(likelihood: Likelihood, now: "_Sizes", bar: _Bar) -> list[str]:
+    """Components of scatter that a score test points to, beside what there is."""
+    names = [part for part in likelihood.uneven if part not in now.parts]
+    if not names:
+        return []
+    scatter = likelihood.taking.scatter
+    residual, absorbed = likelihood.left(likelihood.noise(now.parts, now.logs))
+    far = uneven(residual, absorbed, scatter, names)
+    told = [
+        float(one) if scatter.is_added(name) else abs(float(one))
+        for name, one in zip(names, far, strict=True)
+    ]
+    ranked = np.argsort(-np.array(told), kind="stable")[:TRIED]
+    return [names[k] for k in ranked if told[k] > POINTED]
+
+
+def _pruned(likelihood: Likelihood, now: "_Sizes", bar: _Bar) -> "_Sizes":
+    """Without the overall scale, or one of scatter, that others have made superfluous."""
+    own = [part for part in now.parts if part == "scale" or part in bar.own(now.parts)]
+    for part in own if len(own) > 1 else ():
+        kept = [k for k, name in enumerate(now.parts) if name != part]
+        parts = tuple(now.parts[k] for k in kept)
+        logs = tuple(now.logs[k] for k in kept)
+        less = _settled(likelihood, _Sizes(parts, logs, likelihood.at(parts, logs)))
+        if less.value - now.value < bar.of(part, now):
+            now = less
+    return now
 
 
 @dataclass(frozen=True)
@@ -168,7 +205,7 @@ class _Sizes:
     value: float
 
 
-def _joined(likelihood: _Likelihood, now: _Sizes, part: str) -> _Sizes:
+def _joined(likelihood: Likelihood, now: _Sizes, part: str) -> _Sizes:
     """One component more, all at their most likely sizes."""
     parts = (*now.parts, part)
     low, high = likelihood.low[part], likelihood.high[part]
@@ -186,11 +223,20 @@ def _joined(likelihood: _Likelihood, now: _Sizes, part: str) -> _Sizes:
     alone = _Sizes(parts, (*now.logs, float(found.x)), float(found.fun))
     if not now.parts or now.value - alone.value < FAINT:
         return alone
+    return _settled(likelihood, alone)
+
+
+def _settled(likelihood: Likelihood, near: _Sizes) -> _Sizes:
+    """All components together at their most likely sizes."""
+    from scipy import optimize  # slow to import: only where noise is estimated
+
+    if not near.parts:
+        return near
 
     def value(logs: Array) -> float:
-        return likelihood.at(parts, logs.tolist())
+        return likelihood.at(near.parts, logs.tolist())
 
-    start = np.array(alone.logs)
+    start = np.array(near.logs)
     best: Array = optimize.fmin(
         value,
         start,
@@ -200,17 +246,25 @@ def _joined(likelihood: _Likelihood, now: _Sizes, part: str) -> _Sizes:
         maxfun=36,
         disp=False,
     )
-    together = _Sizes(parts, tuple(best.tolist()), value(best))
-    return together if together.value < alone.value else alone
+    together = _Sizes(near.parts, tuple(best.tolist()), value(best))
+    return together if together.value < near.value else near
 
 
 def _components(
-    likelihood: _Likelihood, now: _Sizes, gains: dict[str, float]
+    likelihood: Likelihood, now: _Sizes, gains: dict[str, float], bar: _Bar
 ) -> tuple[Component, ...]:
-    """Values with uncertainties from the curvature of log L, and p by the likelihood ratio."""
-    spread = _spread(likelihood, now.parts, now.logs)
-    noise = likelihood.noise(now.parts, now.logs)
-    values = {
+    """Values with uncertainties from the curvature of log L, and p by the likelihood ratio.
+
+    Uncertainties of scatter are as much larger as tails make them.
+    """
+    sums = np.eye(len(now.parts))
+    if "scale" in now.parts:
+        for part in bar.own(now.parts):
+            sums[now.parts.index(part), now.parts.index("scale")] = 1.0
+    noise, own = likelihood.noise(now.parts, now.logs), bar.own(now.parts)
+    heavy = bar.heavy(now) if own else 1.0
+    relative = spread(likelihood, now.parts, now.logs, sums)
+    values = dict(noise.scatter) | {
         "correlated": noise.tau_s,
         "successive": noise.tau_s,
         "walk": noise.step,
@@ -218,41 +272,15 @@ def _components(
         "visit": noise.visit,
         "scale": noise.narrow,
     }
+    values |= {part: values[part] * noise.narrow for part in own}
+    wider = {part: math.sqrt(heavy) for part in own}
     return tuple(
         Component(
             SAID.get(part, part),
             values[part],
-            float(values[part] * spread[k]),
-            _chance(gains[part]),
+            float(values[part] * relative[k] * wider.get(part, 1.0)),
+            bar.chance(part, gains[part], heavy),
         )
         for k, part in enumerate(now.parts)
         if part in values
     )
-
-
-def _chance(gain: float) -> float:
-    """Probability of such a rise where there is none of it: chi-square of one, from its edge."""
-    return float(0.5 * chi2_above(1.0, 2.0 * gain))
-
-
-def _spread(likelihood: _Likelihood, parts: tuple[str, ...], logs: tuple[float, ...]) -> Array:
-    """Standard deviations of the logs by second differences; inf where they are flat."""
-    size, width = len(parts), 0.1
-    moves = width * np.eye(size)
-    centre = likelihood.at(parts, logs)
-    at = np.array(logs)
-    curvature = np.zeros((size, size))
-    for i in range(size):
-        ahead, back = (likelihood.at(parts, tuple(at + s * moves[i])) for s in (1.0, -1.0))
-        curvature[i, i] = (ahead + back - 2.0 * centre) / width**2
-        for j in range(i):
-            corners = [
-                s * t * likelihood.at(parts, tuple(at + s * moves[i] + t * moves[j]))
-                for s in (1.0, -1.0)
-                for t in (1.0, -1.0)
-            ]
-            curvature[i, j] = curvature[j, i] = sum(corners) / (4.0 * width**2)
-    values, vectors = np.linalg.eigh(curvature)
-    variance = np.where(values > 1e-9, 1.0 / np.maximum(values, 1e-9), np.inf)
-    seen = [float(np.sum(row[row != 0] ** 2 * variance[row != 0])) for row in vectors]
-    return np.asarray(np.sqrt(seen), dtype=np.float64)

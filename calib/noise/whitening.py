@@ -67,6 +67,13 @@ class Whitening:
     def __init__(self, taking: Taking, noise: Noise) -> None:
         self._count = taking.run.size
         self._noise = noise
+        self._own: Array | None = None
+        own_log_det = 0.0
+        if noise.scatter:
+            root = taking.scatter.root(noise.scatter)
+            self._own = np.ascontiguousarray(np.moveaxis(np.linalg.inv(root), 0, -1))
+            own_log_det = 2.0 * float(np.sum(np.log(np.diagonal(root, axis1=1, axis2=2))))
+            taking = taking.corrected(self._own) if noise.visit > 0.0 else taking
         self._plain = noise.tau_s <= 0.0 and noise.visit <= 0.0
         self._layout: _Layout | None = None
         self._chain: tuple[IntArray, Array] | None = None
@@ -86,9 +93,12 @@ class Whitening:
             if taking.live is not None:
                 logs = logs * taking.live[:, layout.reading[layout.there]].T
             self.log_det = 2.0 * float(np.sum(logs))
+        self.log_det += own_log_det
 
     def apply(self, columns: Array) -> Array:
         """Columns (..., 3, A) of whitened components, made white; each stays in its place."""
+        if self._own is not None:
+            columns = _times(self._own, columns)
         if self._plain:
             return columns / self._noise.scale if self._noise.scale != 1.0 else columns
         flat = columns.reshape(-1, 3, self._count)
@@ -121,6 +131,16 @@ class Whitening:
         out = np.zeros_like(rows)
         out[layout.reading[layout.there]] = white[layout.there]
         return np.asarray(np.moveaxis(out.swapaxes(0, 1), -1, 0))
+
+
+def _times(lower: Array, columns: Array) -> Array:
+    """Lower triangular matrices (3, 3, A) times columns (..., 3, A)."""
+    out = np.empty_like(columns)
+    for row in range(3):
+        out[..., row, :] = lower[row, 0] * columns[..., 0, :]
+        for other in range(1, row + 1):
+            out[..., row, :] += lower[row, other] * columns[..., other, :]
+    return out
 
 
 @lru_cache(maxsize=8)
