@@ -3,7 +3,7 @@
     extension_i = d_i   from t0 to the end of that run
 
 The moment is searched between the stops of the machine. Several runs stand one after the other on
-the clock of t0; homing before the next one brings the actuator back.
+the clock of t0; homing before the next one brings the actuator back, or to another place.
 """
 
 from collections.abc import Sequence
@@ -34,14 +34,21 @@ class ActuatorStep(OneStep):
         return "" if self.moments(rows).size else "too few readings at different times"
 
     def moments(self, rows: Rows) -> Array:
-        """Moments between successive stops with a reading, away from the ends of each run."""
-        found = []
+        """Moments between successive stops with a reading, away from the ends of each run.
+
+        Among them the start of every run but the first.
+        """
+        found = [self.at_any_rate(rows)]
         for run, start in enumerate(run_starts(rows)):
             here = (rows.run == run) & rows.on_platform
             stops, first = np.unique(rows.path.stop[rows.at[here]], return_index=True)
             times = np.sort(rows.time_s[here][first])
             found.append(start + between(times, max(2, int(EDGE * stops.size))))
-        return np.concatenate(found)
+        return np.sort(np.concatenate(found))
+
+    def at_any_rate(self, rows: Rows) -> Array:
+        """Starts of runs: an actuator comes back from homing, or from a repair, somewhere else."""
+        return run_starts(rows)[1:]
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``actuator-step.leg1`` .., mm or rad; ``.t0`` in s."""

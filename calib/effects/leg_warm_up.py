@@ -11,7 +11,7 @@ from calib.arrays import Array
 from calib.effects.component import Effect, Signature, Situation, per_actuator
 from calib.effects.fading import time_constant
 from calib.effects.tracker import run_prefix
-from calib.effects.warm_up import WarmUp
+from calib.effects.warm_up import LONGEST_S, WarmUp
 from calib.runs.stack import Rows
 from calib.unknown import Unknown
 
@@ -35,7 +35,8 @@ class LegWarmUp(Effect):
             for run in range(len(rows.runs))
             for axis in rows.machine.axes
         )
-        return (*amplitudes, Unknown("leg-warm-up.tau", "s", 1200.0, nonlinear=True))
+        tau = Unknown("leg-warm-up.tau", "s", 1200.0, sigma=LONGEST_S, nonlinear=True)
+        return (*amplitudes, tau)
 
     def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:
         """Each actuator alone, in all runs."""

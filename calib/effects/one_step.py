@@ -29,11 +29,18 @@ class OneStep(Effect):
 
     def trials(self, rows: Rows) -> Iterator[tuple[float, ...]]:
         """Moments over all runs."""
-        for moment in spread(self.moments(rows)):
+        for moment in self._tried(rows):
             yield (float(moment),)
 
     def refined(self, rows: Rows, trial: tuple[float, ...]) -> Iterator[tuple[float, ...]]:
         """Every moment between the neighbouring ones that were tried."""
         every = self.moments(rows)
-        for moment in about(spread(every), every, trial[0]):
+        for moment in about(self._tried(rows), every, trial[0]):
             yield (float(moment),)
+
+    def at_any_rate(self, rows: Rows) -> Array:
+        """Moments that are tried however many there are."""
+        return np.array([])
+
+    def _tried(self, rows: Rows) -> Array:
+        return np.union1d(spread(self.moments(rows)), self.at_any_rate(rows))

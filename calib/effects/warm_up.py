@@ -50,11 +50,16 @@ class WarmUp(Effect):
             for run in range(len(rows.runs))
             for unit, which in units.items()
         )
-        return (*amplitudes, Unknown("warm-up.tau", "s", 1200.0, nonlinear=True))
+        return (*amplitudes, Unknown("warm-up.tau", "s", 1200.0, sigma=LONGEST_S, nonlinear=True))
 
     def trials(self, rows: Rows) -> Iterator[tuple[float, ...]]:
-        """From two minutes to two hours, in equal ratios."""
-        for tau in np.geomspace(SHORTEST_S, LONGEST_S, TRIALS):
+        """From two minutes to two hours, in equal ratios; of several runs to the longest one.
+
+        What hardly fades in a run is a machine that differs from run to run, and no warm-up.
+        """
+        spans = [np.ptp(rows.time_s[rows.run == run]) for run in range(len(rows.runs))]
+        longest = LONGEST_S if len(spans) == 1 else min(LONGEST_S, max(2 * SHORTEST_S, *spans))
+        for tau in np.geomspace(SHORTEST_S, longest, TRIALS):
             yield (float(tau),)
 
     def signature(self, situation: Situation, values: Array) -> Signature:

@@ -19,11 +19,12 @@ from calib.look.misfit import look_at_misfit
 from calib.look.moved import moved_station, parts_of
 from calib.look.places import Places, places_of, points_of_one, roughly_known
 from calib.look.point_units import point_units
-from calib.look.pose_labels import pose_labels
+from calib.look.pose_labels import pose_labels, shared_labels
 from calib.look.proposal import Proposal
 from calib.look.refined import refined
 from calib.look.repeats import no_measurements
 from calib.look.rewritten import rewritten
+from calib.look.rewritten_commands import rewritten_commands
 from calib.look.rivals import bears_out, better_story, with_fit
 from calib.look.seats import displaced_seat
 from calib.look.sigmas import in_um, sigmas
@@ -43,7 +44,7 @@ _Look = Callable[[Run], tuple[Run, list[Remark]]]
 _Hypothesis = Callable[[Places], Proposal | None]
 HYPOTHESES: tuple[_Hypothesis, ...] = (
     other_labels, rewritten, displaced_seat, turned_table, framed_table, moved_station,
-    mirrored_table, any_labels, slid_rows, held_actuator,
+    mirrored_table, any_labels, slid_rows, held_actuator, rewritten_commands,
 )  # fmt: skip
 """What may explain readings that stand in no nest; the first that explains all is taken."""
 OF_COLUMNS: tuple[_Look, ...] = (clock, temperatures, load_and_payload)
@@ -77,23 +78,35 @@ def first_look(machine: Machine, runs: Sequence[Run]) -> Rows:
     remarks: list[Remark] = _serials(runs)
     looked: list[Run] = []
     known: _Known = {}
-    for run in runs:
-        check_travel(machine, run)
-        points = points_of_one(run)
-        run, of_rows = rows_alone(machine, run) if points else _each(run, OF_COLUMNS)
+    for given in runs:
+        check_travel(machine, given)
+        points = points_of_one(given)
+        run, of_rows = rows_alone(machine, given) if points else _each(given, OF_COLUMNS)
         if not points or roughly_known(run):  # nothing to say of where SMRs stand
             remarks += of_rows
             looked.append(run)
             continue
         check_lengths(machine, run)
         story = _in_units(machine, run, alone=len(runs) == 1)
-        if any(one.name == "rows-shifted" for one in story.remarks):
+        parts = [_own_labels(machine, one, given) for one in story.parts]
+        told = {one.name for one in story.remarks}
+        own = all(one.pose == given.pose for one in parts)
+        if "rows-shifted" in told or ("q-rewritten" in told and own):
             # labels were right, q was not
             of_rows = [one for one in of_rows if one.name != "pose-label-shared"]
         remarks += [*of_rows, *story.remarks]
-        looked += story.parts
+        looked += parts
         known = story.known
     return replace(stack(machine, looked), remarks=tuple(remarks), known=known)
+
+
+def _own_labels(machine: Machine, run: Run, given: Run) -> Run:
+    """The run with the labels it was given, where each is one command once q is put right."""
+    if run.pose == given.pose:
+        return run
+    two = shared_labels(machine, replace(run, pose=given.pose))
+    pose = zip(given.pose, run.pose, strict=True)
+    return replace(run, pose=tuple(now if own in two else own for own, now in pose))
 
 
 def _in_units(machine: Machine, run: Run, *, alone: bool) -> Story:

@@ -27,9 +27,9 @@ class Way:
 
 
 def of_one_axis(run: Run) -> Iterator[Way]:
-    """One of x, y, z in m or in inches, the other two in mm."""
+    """One of x, y, z in m, in um or in inches, the other two in mm."""
     for axis, name in enumerate("xyz"):
-        for factor, unit in ((1000.0, "m"), (25.4, "inches")):
+        for factor, unit in ((1000.0, "m"), (0.001, "um"), (25.4, "inches")):
             scale = np.ones((3, 1))
             scale[axis] = factor
             yield Way(

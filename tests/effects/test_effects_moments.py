@@ -73,3 +73,22 @@ def test_it_is_over_when_its_run_ends(rows: Rows, name: str) -> None:
     follow = FollowUp(fitted, poses, {})
     one = values[: len(effect.unknowns(follow.rows))]
     assert not np.any(follow.columns(effect, one, follow.approached([])))
+
+
+def test_an_actuator_that_is_elsewhere_in_the_second_run_is_off_from_its_start() -> None:
+    plan = replace(PLAN, poses=10, nests=("3", "4"))
+    first = simulate(plan)
+    moved = {**first.parameters, "leg4.L0": first.parameters["leg4.L0"] + 0.1}
+    again = simulate(replace(plan, seed=12, parameters=moved))
+    machine = load_machine("hexapod")
+    texts = [(run_toml(one), points_csv(one)) for one in (first, again)]
+    rows = stack(machine, [parse_run(*text, actuators=6) for text in texts])
+    asked = [effect_named(name, machine) for name in ("actuator-step", "leg-warm-up")]
+    refit = Refitter(rows, asked)
+    best = refit(()).diagnosis.best
+    assert best is not None
+    assert best.name == "actuator-step"
+    fitted = refit(("actuator-step",)).fit
+    found = dict(zip(fitted.model.names, fitted.values.tolist(), strict=True))
+    assert found["actuator-step.leg4"] == pytest.approx(0.1, abs=0.02)
+    assert abs(found["actuator-step.t0"] - run_starts(rows)[1]) < 1e-6
