@@ -1,12 +1,17 @@
 """Deciding by itself against a fixed plan: readings spent, targets held, causes named.
 
     python -m bench auto [--worlds 100] [--target-um 8 3] [--seed 1] [--out FILE] [--minutes 5]
+    python -m bench auto --wire 5 [--target-um 8] ...
 
 Worlds are simulated by the mock's own physics: 0 to 3 hidden effects of the catalogue, at two
 sqrt(3) sigma RMS each; every other four worlds have noise that is correlated from reading to
 reading (0.3). In each the autopilot works until it stops, once for every target; the fixed plan
 measures 40 poses once and discovers. The true error is that of noise-free readings at fresh poses
 against the model, which none of them sees.
+
+With --wire each world is a mock station in a process of its own, 1, 2, 3 and 0 effects hidden in
+turn, under noise that is slow; ``pkmcal auto`` is another process and nobody answers it.
+``machine_um`` is then the true error of the machine as it was left, by the station's own truth.
 
 Every world is a line of FILE: the same command goes on where the last one was. No world is begun
 after so many minutes.
@@ -19,7 +24,7 @@ import os
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -34,7 +39,18 @@ from app.files.machines import load_machine
 from app.files.pose_table import Pose
 from app.jobs.posing import choose_poses
 from app.jobs.predicting import predict
-from bench._blind_cases import NEXT_TO_NONE_MM, SIGMA_MM, Case, build, drawn_on
+from bench._auto_wires import tried_on_wires
+from bench._auto_worlds import (
+    FIXED,
+    HOURS,
+    MACHINE,
+    Came,
+    World,
+    draw,
+    draw_for_wires,
+    hidden_in,
+)
+from bench._blind_cases import NEXT_TO_NONE_MM, SIGMA_MM
 from bench._blind_noise import noisy
 from bench._intervals import median, share
 from mocks.hidden.table import Hidden
@@ -42,39 +58,9 @@ from mocks.simulate.files import write
 from mocks.simulate.plan import Profile, RunPlan
 from mocks.simulate.run import simulate
 
-MACHINE, FIXED, SIZE = "hexapod", 40, 2.0
 MINUTES_A_POSE = 2.0
-CORRELATED = "ar:0.3"
 QUIET_MM = 5e-5
 """Noise of the readings that tell the true error."""
-OF_ONE_RUN = ("frame-shift", "actuator-step", "nest-step", "warm-up")
-"""Events of one run: a world of several runs cannot hold them alike."""
-
-
-@dataclass(frozen=True)
-class World:
-    """A machine with its hidden effects, how its readings err, and the seed of everything."""
-
-    seed: int
-    effects: tuple[str, ...]
-    noise: str
-
-
-@dataclass(frozen=True)
-class Came:
-    """What one way of measuring came to in one world.
-
-    ``readings`` for the fit, ``proof`` those of verifications; ``open``: pairs that are in
-    question at the end; ``reached``: what the autopilot said.
-    """
-
-    readings: int
-    proof: int
-    true_um: float
-    named: bool
-    false_names: int
-    open: int
-    reached: bool | None = None
 
 
 class SimulatedLaboratory:
@@ -138,24 +124,9 @@ class SimulatedLaboratory:
         return float(predict(model, run, frame=True).rms_um or np.nan)
 
 
-def draw(count: int, seed: int) -> list[World]:
-    """Worlds with 0 to 3 hidden effects in turn, four with white and four with other noise."""
-    rng = np.random.default_rng(seed)
-    names = [name for name in drawn_on(MACHINE, unknown=False) if name not in OF_ONE_RUN]
-    return [
-        World(
-            seed * 10_000 + k,
-            tuple(map(str, rng.choice(names, k % 4, replace=False))),
-            CORRELATED if k // 4 % 2 else "",
-        )
-        for k in range(count)
-    ]
-
-
 def tried(world: World, targets_um: Sequence[float]) -> dict[str, Came]:
     """The autopilot for each target, and the fixed plan, in one world."""
-    case = Case(world.seed, world.effects, (SIZE,) * len(world.effects), "", machine=MACHINE)
-    _, hidden = build(case, 40)
+    hidden = hidden_in(world)
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
         came = {
@@ -166,7 +137,7 @@ def tried(world: World, targets_um: Sequence[float]) -> dict[str, Came]:
 
 
 def _auto(laboratory: SimulatedLaboratory, target_um: float) -> Came:
-    pilot = Autopilot(laboratory.folder, laboratory, Limits(target_um, minutes=6 * 60.0))
+    pilot = Autopilot(laboratory.folder, laboratory, Limits(target_um, minutes=60.0 * HOURS))
     last = asyncio.run(pilot.run())
     done = pilot.journal.of("done")
     found = Findings.from_json(pilot.journal.of("found")[-1])
@@ -233,7 +204,7 @@ def by_kind(worlds: Sequence[World], done: Mapping[int, Mapping[str, Came]]) -> 
         "| hidden, noise | worlds | " + " | ".join(ways) + " |",
         "|---" * (2 + len(ways)) + "|",
     ]
-    for noise in ("", CORRELATED):
+    for noise in dict.fromkeys(world.noise for world in worlds):
         for count in range(4):
             here = [
                 done[w.seed] for w in worlds
@@ -243,6 +214,8 @@ def by_kind(worlds: Sequence[World], done: Mapping[int, Mapping[str, Came]]) -> 
                 f"{sum(one[way].named and not one[way].false_names for one in here)}"
                 for way in ways
             )
+            if not here:
+                continue
             kind = f"{count}, {noise or 'white'}"
             lines.append(f"| {kind} | {len(here)} | " + " | ".join(right) + " |")
     return lines
@@ -251,18 +224,24 @@ def by_kind(worlds: Sequence[World], done: Mapping[int, Mapping[str, Came]]) -> 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--worlds", type=int, default=100)
+    parser.add_argument("--wire", type=int, metavar="N", help="N worlds on the wire instead")
     parser.add_argument("--target-um", type=float, nargs="+", default=[8.0, 3.0])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path)
     parser.add_argument("--minutes", type=float, default=np.inf)
     options = parser.parse_args()
-    worlds = draw(options.worlds, options.seed)
+    worlds = (
+        draw_for_wires(options.wire, options.seed)
+        if options.wire
+        else draw(options.worlds, options.seed)
+    )
+    judged = tried_on_wires if options.wire else tried
     done = read(options.out) if options.out else {}
     began = time.monotonic()
     for world in worlds:
         if world.seed in done or time.monotonic() - began > 60.0 * options.minutes:
             continue
-        done[world.seed] = tried(world, options.target_um)
+        done[world.seed] = judged(world, options.target_um)
         if options.out:
             came = {way: asdict(one) for way, one in done[world.seed].items()}
             with options.out.open("a", encoding="utf-8") as file:

@@ -75,6 +75,10 @@ def parser() -> argparse.ArgumentParser:
         "--linuxcnc", type=Path, metavar="FOLDER",
         help="hexapod: LinuxCNC itself, which must be installed, with its files in FOLDER",
     )  # fmt: skip
+    parser.add_argument(
+        "--noise-tau", type=float, default=1.0, metavar="S",
+        help="how slow the slow part of the tracker's noise is; above 10 s readings err alike",
+    )  # fmt: skip
     parser.add_argument("--payload", type=float, default=0.0, help="kg")
     for name in ("controller", "tracker", "control"):
         parser.add_argument(

@@ -277,11 +277,14 @@ def build(options: argparse.Namespace) -> MockStation:
         machine=options.machine,
         own=machine if own else None,
         body=body,
+        noise_tau_s=options.noise_tau,
     )
     clock = ScaledClock(options.scale)
     world = World(clock, plan)
     world.payload_kg = options.payload
     ports = (options.controller_port, options.tracker_port, options.control_port)
+    if not options.noise_tau > 0.0:
+        raise ValueError(f"--noise-tau is {options.noise_tau:g} s; give a time of more than 0 s")
     if options.pose and options.machine != "hexapod":
         raise ValueError(f"there is no closed controller (--pose) of the {options.machine}")
     if options.bare and (options.pose or world.kind in ON_GCS):

@@ -27,6 +27,8 @@ from mocks.physics.truth import draw_parameters
 from mocks.smrs import BIRDBATH, HAND, Smrs
 
 HAND_AWAY = (0.0, 0.0, -1000.0)
+SLOW_TAU_S = 1.0
+"""Correlation time of the slow part of a tracker's noise."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,8 @@ class WorldPlan:
     ``machine`` names the body; ``own`` is one's own machine with such a body; ``body`` is a body
     itself. ``parameters`` are the true ones (drawn by ``seed`` if None); ``load`` that of the
     body's surroundings if None. ``smrs``: one SMR, in the birdbath, or three, in the platform's
-    nests. ``base_smrs``: each base nest holds its own.
+    nests. ``base_smrs``: each base nest holds its own. ``noise_tau_s``: how slow the slow part of
+    the tracker's noise is; where that is longer than a dwell, successive readings err alike.
     """
 
     seed: int = 1
@@ -48,6 +51,7 @@ class WorldPlan:
     machine: str = "hexapod"
     own: Machine | None = None
     body: Body | None = None
+    noise_tau_s: float = SLOW_TAU_S
 
 
 class World:

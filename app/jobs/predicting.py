@@ -1,7 +1,6 @@
 """Ask a saved model what it says of readings that it has not seen."""
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,12 +11,12 @@ import numpy as np
 from app.analysis import load_rows
 from app.files.fits import SavedFit, read_fit
 from app.files.residuals import write_residuals
+from app.jobs.carried_over import known_to, same_machine
 from app.jobs.chosen_runs import File, Runs, names_of, path_of
 from app.jobs.fitting import BadReadingEntry, RemarkEntry
 from app.jobs.record import Record, Report
 from calib.arrays import Array, BoolArray
-from calib.errors import BadInput
-from calib.identify.predicting import Known, Prediction, shift_of_frames
+from calib.identify.predicting import Prediction, shift_of_frames
 from calib.identify.predicting import predict as predicted
 from calib.model.prediction import Model
 from calib.runs.remark import plain_remarks
@@ -144,104 +143,15 @@ def predict(model: File, runs: Runs, *, frame: bool = False) -> PredictReport:
     rows, effects = load_rows(names, (), path)
     shown = effects[len(saved.effects) :]  # those that the record itself shows are not the model's
     asked = Model(rows, effects[: len(saved.effects)])
-    _same_machine(saved, asked)
+    same_machine(saved, asked)
     remarks = [
         f"{one.id} shows in the readings and is not in the model: nothing makes up for it"
         for one in shown
     ]
-    known, lacking = _known(saved, asked, frame, remarks)
+    known, lacking = known_to(saved, asked, frame, remarks)
     found = predicted(asked, known, refit=frame)
     said = _said(saved, found, lacking, remarks)
     return PredictReport.of(said, _found=found, _runs=names)
-
-
-def _same_machine(saved: SavedFit, model: Model) -> None:
-    machine = model.machine
-    known = any(p.name in saved.estimates for p in machine.parameters)
-    named = Path(saved.machine).name.removesuffix(".toml")
-    if (named and named != machine.name) or not known:
-        raise BadInput(
-            f'the model is of "{saved.machine}", the run of "{machine.name}"',
-            place=saved.source,
-            remedy="Name a run of the machine that the model is of",
-        )
-
-
-def _known(
-    saved: SavedFit, model: Model, frame: bool, remarks: list[str]
-) -> tuple[Known, tuple[str, ...]]:
-    """Values and covariance in the model's order; names of unknowns that the file lacks."""
-    names = list(saved.estimates)
-    at = [_place_in(saved, name, model, frame) for name in model.names]
-    values = model.centre.copy()  # of what the file lacks
-    at_rest = np.concatenate([np.zeros(0), *model.effects_at_rest])
-    values[model.free.size : model.free.size + at_rest.size] = at_rest
-    select = np.zeros((len(at), len(names)))
-    lacking = []
-    own = np.zeros(len(at))
-    for k, (name, held) in enumerate(zip(model.names, at, strict=True)):
-        if held is not None:
-            values[k] = saved.estimates[held].value
-            select[k, names.index(held)] = 1.0
-            if not np.isfinite(values[k]):
-                raise BadInput(
-                    f"{held} has no value", place=saved.source, remedy="Save the model again"
-                )
-        elif np.isfinite(model.prior[k]):
-            lacking.append(name)
-            own[k] = model.prior[k] ** 2
-    unsure = [name for name in names if not np.isfinite(saved.estimates[name].sigma)]
-    if unsure:
-        remarks.append(
-            f"the model file does not say how uncertain {', '.join(unsure[:3])} is: taken as exact"
-        )
-    covariance = select @ np.nan_to_num(saved.covariance) @ select.T + np.diag(own)
-    if not saved.correlated:
-        remarks.append(
-            "the model file has no correlations, so that what is expected is too large or too "
-            "small: use the file of pkmcal fit --save"
-        )
-    _compensated(saved, model, values, remarks)
-    return Known(values, covariance), tuple(lacking)
-
-
-def _place_in(saved: SavedFit, name: str, model: Model, frame: bool) -> str | None:
-    """Name in the file of an unknown of the model; raises BadInput for a frame that is not there.
-
-    A model of one run has one frame, where the tracker stood; other runs are taken from there.
-    """
-    if ".frame." not in f".{name}":
-        return name if name in saved.estimates else None
-    if frame:
-        return None
-    one = re.sub(r"^run\d+\.", "", name)
-    if one not in saved.estimates:
-        raise BadInput(
-            "the model was fitted to several runs: it has no one place of the tracker",
-            place=saved.source,
-            remedy="Let the place of the tracker be fitted: --frame",
-        )
-    return one
-
-
-def _compensated(saved: SavedFit, model: Model, values: Array, remarks: list[str]) -> None:
-    """Take off what the controller compensated here beyond what it did for the model's runs."""
-    held = [dict(run.header.compensation) for run in model.rows.runs]
-    before = saved.compensation or {}
-    names = dict.fromkeys([*before, *(name for one in held for name in one)])
-    for name in names:
-        here = {one.get(name, 0.0) for one in held}
-        if here == {before.get(name, 0.0)}:
-            continue
-        if len(here) > 1 or name not in model.names:
-            raise BadInput(
-                f"the controller compensated {name} otherwise than for the model's runs",
-                place=model.rows.runs[0].source,
-                remedy="Predict runs that were taken as those of the model, one at a time",
-            )
-        (now,) = here
-        values[model.names.index(name)] -= now - before.get(name, 0.0)
-        remarks.append(f"{name}: what the controller compensates by now is taken off")
 
 
 def _said(

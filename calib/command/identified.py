@@ -140,8 +140,7 @@ def why_not(effect: Effect) -> str:
         return "it is of the measurement, not of the machine"
     if getattr(effect, "acts_on", "actuator") == "point":
         return "it moves the point that is read, which no command counters"
-    # What depends on the run alone goes by the load that its header states: a command has one too.
-    if {"run", "time_s"} <= set(effect.depends):
+    if effect.of_its_run:
         return "it happened in that run, and is over since the machine was referenced anew"
     return ""
 

@@ -203,6 +203,11 @@ class Effect(ABC):
     wrong_sign: str = ""
     wrong_size: str = ""
 
+    @property
+    def of_its_run(self) -> bool:
+        """Whether what it was in one run says nothing of how large it is in another."""
+        return self.ends_with_run or {"run", "time_s"} <= set(self.depends)
+
     def lacking(self, machine: Machine) -> str:
         """Say what the machine file lacks for the effect to be defined; empty if it is."""
         return ""

@@ -49,6 +49,11 @@ class TrackerDrift(Effect):
     kind = "measurement"
     says = "the tracker's stand moves slowly during the run"
 
+    @property
+    def of_its_run(self) -> bool:
+        """It may stand still in the next, or move another way."""
+        return True
+
     def unavailable(self, rows: Rows) -> str:
         """Time must pass."""
         return "" if np.ptp(rows.progress) > 0 else "all readings have the same time"

@@ -1,6 +1,7 @@
 """What a model that is already known says of readings that it has not seen.
 
-Nothing is fitted but, where it is asked for, the base frame of each run. A residual in sigmas is
+Nothing is fitted but, where it is asked for, the base frame of each run, and how it moves where the
+model says that the tracker drifted. A residual in sigmas is
 then e = n - J d with n the noise of the new readings, d the error of the model's unknowns with
 covariance C. Without a refitted frame its covariance is I + J C J^T. With one, the part along the
 frame's columns F is taken out of both,
@@ -16,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from calib.arrays import Array, BoolArray
+from calib.arrays import Array, BoolArray, IntArray
 from calib.evidence.tails import log_tail
 from calib.identify.readings import BadReading
 from calib.identify.starting import begin
@@ -26,6 +27,8 @@ from calib.model.state import Linearised, State
 from calib.scaled import Scaled, normal_matrix
 
 FRAME_STEPS = 20
+LOST = 1e-10
+"""Part of the largest direction below which readings say nothing of it (a drift in no time)."""
 FRAME_SETTLED = 1e-9
 """Fall of chi-square per reading below which a frame has settled."""
 
@@ -58,8 +61,8 @@ class Prediction:
         Whether the frames were fitted to these readings.
     spread : (q, 3, N)
         Whitened change of each reading with each of q independent unit errors of the model.
-    frame : (6 K, 3, N)
-        Whitened columns of the refitted frames, orthonormal over the accepted readings; none
+    frame : (m, 3, N)
+        Whitened columns of all that was refitted, orthonormal over the accepted readings; none
         otherwise.
     """
 
@@ -126,17 +129,17 @@ def predict(model: Model, known: Known, *, refit: bool) -> Prediction:
     accepted[[reading.row for reading in bad]] = False
     state = _state(model, known, begun.state if refit else None)
     linear = model.linearise(state)
-    own = len(model.names) - 6 * model.frames
     refit = refit and model.frames > 0
+    placed = _placing(model)
     if refit:
-        linear = _frames_fitted(model, linear, accepted)
+        linear = _placed(model, linear, accepted, placed)
     covariance = _by_rotation_vectors(model, linear.state, known.covariance)
     if refit:
-        covariance[own:, :] = covariance[:, own:] = 0.0
+        covariance[placed, :] = covariance[:, placed] = 0.0
     spread = np.tensordot(_root(covariance), linear.jacobian, axes=(0, 0))
     frame = np.zeros((0, *linear.whitened.shape))
     if refit:
-        frame = _orthonormal(linear.jacobian[own:], accepted)
+        frame = _orthonormal(linear.jacobian[placed], accepted)
         inner = np.tensordot(spread[:, :, accepted], frame[:, :, accepted], axes=([1, 2], [1, 2]))
         spread = spread - np.tensordot(inner, frame, axes=1)
     return Prediction(model, linear, accepted, tuple(bad), refit, spread, frame)
@@ -185,15 +188,27 @@ def _state(model: Model, known: Known, begun: State | None) -> State:
     )
 
 
-def _frames_fitted(model: Model, linear: Linearised, accepted: BoolArray) -> Linearised:
-    """Least squares of the frames alone."""
-    frames = 6 * model.frames
+def _placing(model: Model) -> IntArray:
+    """Unknowns that say where a tracker stands, and how it moves meanwhile."""
+    first = model.free.size
+    names: list[int] = []
+    for effect, group in zip(model.effects, model.unknowns, strict=True):
+        if effect.of_its_run and effect.kind == "measurement" and not effect.ends_with_run:
+            names += range(first, first + len(group))
+        first += len(group)
+    every = len(model.names)
+    return np.array([*names, *range(every - 6 * model.frames, every)], dtype=np.intp)
+
+
+def _placed(model: Model, linear: Linearised, accepted: BoolArray, placed: IntArray) -> Linearised:
+    """Least squares of where the tracker stands, alone."""
     cost = float(np.sum(linear.whitened[:, accepted] ** 2))
     for _ in range(FRAME_STEPS):
-        columns = linear.jacobian[-frames:, :, accepted].reshape(frames, -1)
+        columns = linear.jacobian[placed][:, :, accepted].reshape(placed.size, -1)
         slope = columns @ linear.whitened[:, accepted].reshape(-1)
         step = np.zeros(linear.jacobian.shape[0])
-        step[-frames:] = Scaled.of(normal_matrix(columns, np.zeros(frames))).solve(slope, 0.0)
+        normal = Scaled.of(normal_matrix(columns, np.zeros(placed.size)))
+        step[placed] = normal.solve(slope, LOST)
         linear = model.linearise(model.moved(linear.state, step))
         now = float(np.sum(linear.whitened[:, accepted] ** 2))
         if abs(cost - now) < FRAME_SETTLED * accepted.sum():
@@ -223,9 +238,18 @@ def _root(covariance: Array) -> Array:
 
 
 def _orthonormal(columns: Array, accepted: BoolArray) -> Array:
-    """Columns (m, 3, N) combined so that they are orthonormal over the accepted readings."""
+    """Columns (m, 3, N) combined so that they are orthonormal over the accepted readings.
+
+    Directions of which these say nothing are left out.
+    """
     chosen = columns[:, :, accepted].reshape(columns.shape[0], -1)
-    factor = np.linalg.cholesky(chosen @ chosen.T)
-    return np.asarray(np.linalg.solve(factor, columns.reshape(columns.shape[0], -1))).reshape(
-        columns.shape
-    )
+    return np.tensordot(_whitening(chosen @ chosen.T), columns, axes=1)
+
+
+def _whitening(normal: Array) -> Array:
+    """W (q, m) with W N W^T = 1 for a normal matrix N (m, m), of its directions that count."""
+    scale = np.sqrt(np.diag(normal))
+    inverse = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0.0)
+    sizes, axes = np.linalg.eigh(normal * inverse[:, None] * inverse)
+    kept = sizes > LOST * sizes[-1]
+    return np.asarray((axes[:, kept] / np.sqrt(sizes[kept])).T * inverse)

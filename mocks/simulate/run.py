@@ -14,7 +14,8 @@ from mocks.physics.truth import draw_parameters
 from mocks.simulate import machine as machines
 from mocks.simulate.layout import Layout, arrange
 from mocks.simulate.plan import RunPlan
-from mocks.tracker.sensor import SAMPLES_PER_S, SLOW_TAU_S, NoiseLevels
+from mocks.tracker.sensor import SAMPLES_PER_S, NoiseLevels
+from mocks.world import SLOW_TAU_S
 
 DWELL_S = 3.0
 CHANNEL_TAU_S = 60.0

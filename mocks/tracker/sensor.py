@@ -9,7 +9,6 @@ from mocks.physics.signals import Wander, mean_variance
 from mocks.world import World
 
 SAMPLES_PER_S = 500.0
-SLOW_TAU_S = 1.0
 PATH_INSTANTS = 24
 STANDARD_AIR = (20.0, 1013.25, 50.0)
 
@@ -18,7 +17,7 @@ STANDARD_AIR = (20.0, 1013.25, 50.0)
 class NoiseLevels:
     """Standard deviations: range in mm, angles (across the beam) in rad.
 
-    The slow part has a correlation time of 1 s; with these levels a 3 s dwell at 1.2 m to 1.4 m
+    With a correlation time of 1 s of the slow part and these levels a 3 s dwell at 1.2 m to 1.4 m
     has 3 um along and 4 um across the beam.
     """
 
@@ -54,7 +53,7 @@ def refraction_ppm(temperature: float, pressure: float, humidity: float) -> floa
 
 
 class Sensor:
-    """Turns true points into readings.
+    """Turns true points into readings; the slow noise is as slow as the world's plan says.
 
     ``environment`` (deg C, hPa, %) is the air that the tracker assumes, None for the air as it
     is. ``range_error`` is added to every range, mm (a reflector that is not the one selected).
@@ -64,7 +63,8 @@ class Sensor:
         self._world = world
         self._noise = noise or NoiseLevels()
         self._rng = np.random.default_rng([world.plan.seed, 4])
-        self._slow = Wander(self._rng, SLOW_TAU_S, 3)
+        self._tau_s = world.plan.noise_tau_s
+        self._slow = Wander(self._rng, self._tau_s, 3)
         self._two_face = world.plan.hidden.get("unknown.two-face.hz")
         self.environment: tuple[float, float, float] | None = None
         self.range_error = 0.0
@@ -92,7 +92,7 @@ class Sensor:
         samples = max(int(SAMPLES_PER_S * (end - start)), 2)
         noise = slow * self._slow.mean(start, end)
         noise = noise + white * self._rng.standard_normal(3) / np.sqrt(samples)
-        share = mean_variance(end - start, SLOW_TAU_S)
+        share = mean_variance(end - start, self._tau_s)
         of_mean = white**2 / samples + share * slow**2
         of_sample = white**2 + (1.0 - share) * slow**2
         luck = self._rng.chisquare(samples - 1, 3) / (samples - 1)

@@ -56,6 +56,29 @@ def test_a_tracker_that_was_moved_is_told_and_the_frame_is_fitted_only_if_asked(
     assert found.rms_um > 1e3
 
 
+@pytest.mark.parametrize(
+    ("name", "then", "now"),
+    [
+        ("frame-shift", {"x": 0.3, "t0": 500.0, "where": 1.0}, {}),
+        ("tracker-drift", {"vx": 0.2}, {"vx": -0.1, "wz": 5e-5}),
+    ],
+)
+def test_what_happened_in_the_runs_of_the_model_is_not_carried_to_others(
+    lab: Path, tmp_path: Path, name: str, then: dict[str, float], now: dict[str, float]
+) -> None:
+    first, second = tmp_path / "first", tmp_path / "second"
+    for folder, seed, hidden in ((first, 5, then), (second, 6, now)):
+        pkmcal.simulate(
+            "tripod", folder, seed=seed, poses=20, parameters=lab / "true.json",
+            effects={f"{name}.{key}": value for key, value in hidden.items()},
+        )  # fmt: skip
+    pkmcal.fit(first, add=[name]).save(tmp_path / "model.toml")
+    found = pkmcal.predict(tmp_path / "model.toml", second, frame=True)
+    assert found.p_value > 1e-3
+    assert found.rms_um < 1.5 * found.noise_um + 5.0
+    assert any(one.startswith(f"{name}: ") for one in found.remarks)
+
+
 def test_covariance_by_blocks_is_that_of_the_whole(again: PredictReport) -> None:
     found = again._found
     p = found.linear.jacobian.shape[0] - 6
