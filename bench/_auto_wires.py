@@ -26,7 +26,17 @@ from app.jobs.predicting import predict
 from app.jobs.verifying import begin_verifying
 from app.session.session import Session
 from app.verification import judge_session
-from bench._auto_worlds import FIXED, HOURS, MACHINE, Came, World, hidden_in
+from bench._auto_worlds import (
+    FIXED,
+    FROM_COLD,
+    HOURS,
+    MACHINE,
+    OF_THE_TRACKER,
+    Came,
+    World,
+    hidden_in,
+    without,
+)
 from mocks.control import ControlClient
 from mocks.hidden.table import Hidden
 from mocks.simulate.files import write
@@ -104,7 +114,7 @@ class WireWorld:
             seed=self.seed + 1_000_000,
             poses=np.array(list(poses.values())),
             noise_mm=QUIET_MM,
-            hidden=Hidden(self.hidden),
+            hidden=Hidden(without(self.hidden, FROM_COLD + OF_THE_TRACKER)),
             parameters=truth["parameters"],
             profile=Profile(rise_K=2.0),
             delays=True,

@@ -12,6 +12,15 @@ HOURS = 6.0
 CORRELATED, SLOW = "ar:0.3", "slow"
 OF_ONE_RUN = ("frame-shift", "actuator-step", "nest-step", "warm-up")
 """Events of one run: a world of several runs cannot hold them alike."""
+FROM_COLD = ("leg-warm-up",)
+"""What happens while a machine warms up: in the first run, and not in those that follow."""
+OF_THE_TRACKER = ("tracker-drift",)
+"""What moves the tracker meanwhile, and is no error of the machine."""
+
+
+def without(hidden: Mapping[str, float], over: tuple[str, ...]) -> dict[str, float]:
+    """A hidden table without some effects."""
+    return {name: value for name, value in hidden.items() if name.partition(".")[0] not in over}
 
 
 @dataclass(frozen=True)

@@ -42,13 +42,16 @@ from app.jobs.predicting import predict
 from bench._auto_wires import tried_on_wires
 from bench._auto_worlds import (
     FIXED,
+    FROM_COLD,
     HOURS,
     MACHINE,
+    OF_THE_TRACKER,
     Came,
     World,
     draw,
     draw_for_wires,
     hidden_in,
+    without,
 )
 from bench._blind_cases import NEXT_TO_NONE_MM, SIGMA_MM
 from bench._blind_noise import noisy
@@ -64,25 +67,34 @@ QUIET_MM = 5e-5
 
 
 class SimulatedLaboratory:
-    """Runs of one world; the frame is another one in each, as after a day."""
+    """Runs of one world, one after the other: the frame is another one in each.
+
+    The machine is cold when the first begins; those that follow find it warm.
+    """
 
     def __init__(self, world: World, hidden: Mapping[str, float], folder: Path) -> None:
         folder.mkdir()
-        self.world, self.hidden, self.folder = world, Hidden(dict(hidden)), folder
+        self.world, self.hidden, self.folder = world, dict(hidden), folder
         self.runs = 0
         self.parameters: Mapping[str, float] | None = None
         self.model: Path | None = None
 
-    def run(self, poses: Mapping[str, Pose], noise_mm: float = SIGMA_MM) -> str:
-        """Simulate a run at poses."""
+    def run(
+        self,
+        poses: Mapping[str, Pose],
+        noise_mm: float = SIGMA_MM,
+        over: tuple[str, ...] = (),
+    ) -> str:
+        """Simulate a run at poses, effects of ``over`` being over."""
         self.runs += 1
+        over += FROM_COLD if self.runs > 1 else ()
         plan = RunPlan(
             machine=MACHINE,
             # Another room and other noise in each run, the same machine.
             seed=self.world.seed + 1_000_000 * self.runs,
             poses=np.array(list(poses.values())),
             noise_mm=noise_mm,
-            hidden=self.hidden,
+            hidden=Hidden(without(self.hidden, over)),
             parameters=self.parameters,
             profile=Profile(rise_K=6.0, payload_kg=(0.0, 12.0)),
             prior="normal",
@@ -119,8 +131,11 @@ class SimulatedLaboratory:
         return Seen(own, own, MINUTES_A_POSE * len(poses))
 
     def true_um(self, model: Path) -> float:
-        """RMS of what the model does not know of noise-free readings at fresh poses."""
-        run = self.run(fresh_poses(load_machine(MACHINE)), QUIET_MM)
+        """RMS of what the model does not know of noise-free readings at fresh poses.
+
+        A tracker that stands still reads them, on a warm machine.
+        """
+        run = self.run(fresh_poses(load_machine(MACHINE)), QUIET_MM, OF_THE_TRACKER)
         return float(predict(model, run, frame=True).rms_um or np.nan)
 
 

@@ -1,5 +1,6 @@
 """What is known by now, read from the journal of decisions."""
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -7,6 +8,8 @@ from app.auto.findings import Findings
 from app.auto.journal import Decisions
 from app.auto.policy import Known
 
+SLOWEST, FASTEST = 0.5, 2.0
+"""Powers of the number of poses by which a prediction is taken to fall."""
 HOPELESS, REFUSED, VETOED = "hopeless", "refused", "vetoed"
 """Keys of what came of a decision: a pair that stays in question, a gate's no, a person's no."""
 
@@ -38,6 +41,7 @@ def _with_findings(known: Known, journal: Decisions, done: list[dict[str, Any]])
     return replace(
         known,
         predicted_um=found.predicted_um,
+        falls=_falls(journal, done),
         ambiguous=tuple((a, b) for a, b in found.ambiguous),
         unexplained=found.unexplained,
         rounds_unknown=max(0, len(unknown) - 1) if found.unexplained else 0,
@@ -46,6 +50,23 @@ def _with_findings(known: Known, journal: Decisions, done: list[dict[str, Any]])
         applied=bool(written) and done[written[-1]]["model"] == found.model,
         corrections=len(written),
     )
+
+
+def _falls(journal: Decisions, done: list[dict[str, Any]]) -> float:
+    """By which power of the poses the prediction fell when the last set with the same effects came.
+
+    Where one more unknown is all but free, as of what goes with time in a short run, it falls
+    faster than the root; never slower, as readings are independent.
+    """
+    poses = {line["run"]: int(line["poses"]) for line in done if "run" in line}
+    seen = journal.of("found")[-2:]
+    if len(seen) < 2 or set(seen[0]["effects"]) != set(seen[1]["effects"]):
+        return SLOWEST
+    few, many = (sum(poses[run] for run in line["runs"]) for line in seen)
+    before, now = (float(line["predicted_um"]) for line in seen)
+    if many <= few or not 0.0 < now < before < math.inf:
+        return SLOWEST
+    return min(max(math.log(before / now) / math.log(many / few), SLOWEST), FASTEST)
 
 
 def _declined(done: list[dict[str, Any]]) -> tuple[str, ...]:

@@ -18,6 +18,8 @@ SURE = 0.8
 """A follow-up is worth its time if it gives the right answer with this probability."""
 FEWEST, MOST = 6, 60
 """Poses of one more set: fewer are not worth the walk to the machine, more are decided again."""
+NEVER = 1e6
+"""So many poses nobody measures."""
 SPARE = 0.9
 """Part of the target that a set of poses is planned for."""
 APART = 10
@@ -58,6 +60,9 @@ class Known:
         Measured for the fit, and spent in all.
     predicted_um : float
         RMS of the position error at fresh poses by the covariance of what was identified.
+    falls : float
+        How that falls with the poses, as poses ** -falls: a half, unless the last set with the
+        same effects has shown that it falls faster.
     ambiguous : tuple of (str, str)
         Effects that the readings cannot tell apart: one that the model has, and its rival.
     hopeless : mapping of (str, str) to str
@@ -81,6 +86,7 @@ class Known:
     poses: int = 0
     minutes: float = 0.0
     predicted_um: float = math.inf
+    falls: float = 0.5
     ambiguous: tuple[tuple[str, str], ...] = ()
     hopeless: Mapping[tuple[str, str], str] = field(default_factory=dict)
     unexplained: bool = False
@@ -150,12 +156,16 @@ def decide(known: Known, limits: Limits) -> Decision:
 
 
 def _affordable(known: Known, limits: Limits) -> int:
-    """Poses for which there is time, by what the ones before have taken."""
-    if math.isinf(limits.minutes):
-        return MOST
-    left = limits.minutes - known.minutes
-    each = known.minutes / known.poses
-    return max(0, int(min(MOST, left / each))) if each > 0.0 else MOST
+    """Poses of one more set for which there is time."""
+    return int(min(MOST, _in_time(known, limits)))
+
+
+def _in_time(known: Known, limits: Limits) -> float:
+    """Poses for which there is time in all, by what the ones before have taken; may be infinite."""
+    left, each = limits.minutes - known.minutes, known.minutes / known.poses
+    if math.isinf(limits.minutes) or each <= 0.0:
+        return math.inf
+    return float(max(0.0, left // each))
 
 
 def _apart(known: Known, affordable: int) -> Decision | None:
@@ -192,30 +202,36 @@ def _half_again(known: Known) -> int:
 
 
 def _more(known: Known, limits: Limits, affordable: int) -> Decision:
-    """As many poses as bring the prediction below the target, the variance falling with them."""
-    wanted = math.ceil(known.poses * ((known.predicted_um / (SPARE * limits.target_um)) ** 2 - 1.0))
-    count = max(FEWEST, min(wanted, MOST))
+    """As many poses as bring the prediction below the target, by how it falls with them."""
+    short = known.predicted_um / (SPARE * limits.target_um)
+    wanted = math.ceil(min(known.poses * (short ** (1.0 / known.falls) - 1.0), NEVER))
     if affordable < FEWEST:
         return _stop(
             f"{known.predicted_um:.1f} um are predicted, and the time left is not enough for more "
             "poses",
             reached=False,
         )
-    count = min(count, affordable)
-    then = known.predicted_um * math.sqrt(known.poses / (known.poses + count))
-    if count < wanted and affordable < wanted and then > limits.target_um:
+    in_time = _in_time(known, limits)
+    then = _then(known, in_time)
+    if wanted > in_time and then > limits.target_um:
         return _stop(
-            f"{known.predicted_um:.1f} um are predicted; the {affordable} poses for which there is "
-            f"time would bring {then:.1f} um, {limits.target_um:g} um are wanted",
+            f"{known.predicted_um:.1f} um are predicted; the {in_time:.0f} poses for which there "
+            f"is time would bring {then:.1f} um, {limits.target_um:g} um are wanted",
             reached=False,
         )
+    count = min(max(FEWEST, wanted), MOST, affordable)
     return Decision(
         "measure",
         f"{known.predicted_um:.1f} um are predicted, {limits.target_um:g} um are wanted",
         count,
-        expected={"predicted_um": then},
+        expected={"predicted_um": _then(known, count)},
         ground="accuracy",
     )
+
+
+def _then(known: Known, count: float) -> float:
+    """What is predicted once there are so many poses more."""
+    return float(known.predicted_um * (known.poses / (known.poses + count)) ** known.falls)
 
 
 def _prove(known: Known, limits: Limits, affordable: int) -> Decision:

@@ -9,6 +9,7 @@ import pytest
 
 from app.auto.autopilot import Autopilot, Seen
 from app.auto.journal import NAME, Decisions
+from app.auto.known import known_by
 from app.auto.policy import Decision, Limits
 from app.auto.report import report_of
 from app.errors import GateRefused, StoppedByOperator
@@ -164,6 +165,24 @@ def test_journals_of_before_grounds_were_kept_end_as_they_ended(tmp_path: Path) 
     (tmp_path / NAME).write_text("".join(json.dumps(line) + "\n" for line in lines))
     _, last = fly(tmp_path, Simulated(tmp_path))
     assert (last.kind, last.why) == ("stop", "the operator said no")
+
+
+def test_a_prediction_is_carried_on_as_it_fell_with_the_same_effects(tmp_path: Path) -> None:
+    def falls(effects: list[str], um: float) -> float:
+        journal = Decisions(tmp_path)
+        found = {"model": "m", "ambiguous": [], "unexplained": False, "conditions": {}}
+        journal.write("done", number=1, run="one", poses=15, minutes=30.0)
+        journal.write("found", runs=["one"], effects=["screw-pitch"], predicted_um=80.0, **found)
+        journal.write("done", number=2, run="two", poses=45, minutes=90.0)
+        journal.write("found", runs=["one", "two"], effects=effects, predicted_um=um, **found)
+        told = known_by(journal).falls
+        journal.path.unlink()
+        return told
+
+    assert falls(["screw-pitch"], 20.0) == pytest.approx(1.0)
+    assert falls(["screw-pitch"], 70.0) == 0.5
+    assert falls(["screw-pitch"], 0.1) == 2.0
+    assert falls(["backlash"], 20.0) == 0.5
 
 
 def test_a_damaged_journal_is_named(tmp_path: Path) -> None:

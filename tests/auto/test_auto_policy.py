@@ -18,6 +18,7 @@ knowns = st.builds(
     poses=st.integers(1, 200),
     minutes=st.floats(0.0, 600.0),
     predicted_um=UM,
+    falls=st.floats(0.5, 2.0),
     ambiguous=st.lists(PAIRS, max_size=3).map(tuple),
     hopeless=st.dictionaries(PAIRS, st.just("no"), max_size=3),
     unexplained=st.booleans(),
@@ -49,6 +50,16 @@ def test_no_set_is_larger_than_the_time_left(known: Known, wanted: Limits) -> No
     if decision.count:
         each = known.minutes / known.poses
         assert decision.count * each <= wanted.minutes - known.minutes or each == 0.0
+
+
+def test_all_the_time_that_is_left_is_reckoned_with_not_one_set() -> None:
+    wanted = Limits(8.0, minutes=360.0)
+    known = Known(poses=25, minutes=50.0, predicted_um=20.0)
+    assert (decide(known, wanted).kind, decide(known, wanted).count) == ("measure", MOST)
+    hopeless = decide(replace(known, predicted_um=37.4), wanted)
+    assert hopeless.kind == "stop"
+    assert "155 poses for which there is time would bring 13.9 um" in hopeless.why
+    assert decide(replace(known, predicted_um=37.4, falls=1.5), wanted).kind == "measure"
 
 
 @given(knowns, limits)
