@@ -22,8 +22,9 @@ import numpy as np
 from calib.arrays import Array, BoolArray, IntArray
 from calib.noise.component import Noise, Taking
 
-ROOM = 250_000
-"""Numbers that the states of all steps may hold while columns are filtered."""
+ROOM, ABREAST = 250_000, 32
+"""Numbers that the states of steps may hold while columns are filtered, and how many columns go
+together: as many steps at once as there is room for, so that the time is linear in the readings."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,8 +111,8 @@ class Whitening:
             out[:, :, order] = (flat[:, :, order] - rho * before) / left
             return out.reshape(columns.shape)
         assert self._layout is not None
-        steps, batch, _, size = self._layout.seen.shape
-        chunk = max(1, ROOM // (steps * batch * size))
+        _, batch, _, size = self._layout.seen.shape
+        chunk = max(1, min(ABREAST, ROOM // (batch * size)))
         parts = [
             self._filtered(self._layout, flat[k : k + chunk])
             for k in range(0, flat.shape[0], chunk)
@@ -121,15 +122,20 @@ class Whitening:
     def _filtered(self, layout: _Layout, flat: Array) -> Array:
         """Innovations of columns (k, 3, A)."""
         rows = np.ascontiguousarray(np.moveaxis(flat, 0, -1).swapaxes(0, 1))
-        readings = rows[layout.reading]
-        states = np.zeros((*layout.seen.shape[:2], layout.seen.shape[3], flat.shape[0]))
-        fed = self._filters.take @ readings
-        for step in range(states.shape[0] - 1):
-            np.matmul(self._filters.carry[step], states[step], out=states[step + 1])
-            states[step + 1] += fed[step]
-        white = self._filters.white @ (readings - layout.seen @ states)
         out = np.zeros_like(rows)
-        out[layout.reading[layout.there]] = white[layout.there]
+        steps, batch, _, size = layout.seen.shape
+        at_once = max(1, ROOM // (batch * size * flat.shape[0]))
+        state = np.zeros((batch, size, flat.shape[0]))
+        for first in range(0, steps, at_once):
+            part = slice(first, first + at_once)
+            there, readings = layout.there[part], rows[layout.reading[part]]
+            states = self._filters.take[part] @ readings
+            for step, carry in enumerate(self._filters.carry[part]):
+                after = carry @ state
+                after += states[step]
+                states[step], state = state, after
+            white = self._filters.white[part] @ (readings - layout.seen[part] @ states)
+            out[layout.reading[part][there]] = white[there]
         return np.asarray(np.moveaxis(out.swapaxes(0, 1), -1, 0))
 
 
