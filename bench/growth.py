@@ -8,7 +8,8 @@ system, and the largest resident memory, as the kernel has counted them. Runs ar
 play in one leg, three SMRs read at each pose. A power law is fitted from the smallest number of
 readings to the largest: how much ten times the readings cost is ten to its exponent. What does not
 end within ``--limit`` seconds of CPU is left out, and larger runs of that verb with it. With
-``--out`` the table is written as ``growth.json`` and drawn as ``growth.png``.
+``--out`` the table is written as ``growth.json``, line by line as it comes, and drawn as
+``growth.png``; asked again with the same folder, only what is not in the table is measured.
 """
 
 import argparse
@@ -78,22 +79,46 @@ def count_of(run: Path) -> int:
     return sum(not line.startswith("#") for line in lines if line) - 1
 
 
-def measured(verbs: list[str], readings: list[int], limit: int) -> list[Cost]:
-    """Costs of all verbs for all sizes, printed as they come."""
-    found: list[Cost] = []
+class Table:
+    """Costs in the order of verbs and readings, kept in a folder where there is one."""
+
+    def __init__(self, folder: Path | None) -> None:
+        self._file = None if folder is None else folder / "growth.json"
+        self.costs: list[Cost] = []
+        if self._file is not None and self._file.exists():
+            self.costs = [Cost(**one) for one in json.loads(self._file.read_text("utf-8"))]
+
+    def __contains__(self, asked: tuple[str, int]) -> bool:
+        return asked in {(cost.verb, cost.readings) for cost in self.costs}
+
+    def add(self, cost: Cost) -> None:
+        """Keep one more, and print it."""
+        print(
+            f"{cost.verb:9} {cost.readings:7} readings"
+            f" {cost.cpu_s:8.2f} s {cost.memory_mb:7.0f} MB",
+            flush=True,
+        )
+        self.costs.append(cost)
+        self.costs.sort(key=lambda one: (VERBS.index(one.verb), one.readings))
+        if self._file is not None:
+            self._file.parent.mkdir(parents=True, exist_ok=True)
+            text = json.dumps([asdict(one) for one in self.costs], indent=1)
+            self._file.write_text(text + "\n", encoding="utf-8")
+
+
+def measure(table: Table, verbs: list[str], readings: list[int], limit: int) -> None:
+    """Costs of all verbs for all sizes that the table has not, printed as they come."""
     with tempfile.TemporaryDirectory() as folder:
         left = list(verbs)
         for wanted in sorted(readings):
             run = simulated(Path(folder), wanted)
             count = count_of(run)
-            for verb in list(left):
+            for verb in [one for one in left if (one, count) not in table]:
                 cost = _asked([verb, str(run)], limit)
                 if cost is None:
                     left.remove(verb)
                     continue
-                found.append(Cost(verb, count, *cost))
-                print(f"{verb:9} {count:7} readings {cost[0]:8.2f} s {cost[1]:7.0f} MB", flush=True)
-    return found
+                table.add(Cost(verb, count, *cost))
 
 
 def exponent(costs: list[Cost], what: str) -> float:
@@ -137,7 +162,9 @@ def main() -> None:
     parser.add_argument("--limit", type=int, default=600, help="CPU seconds of one verb")
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
-    costs = measured(options.verbs, options.readings, options.limit)
+    table = Table(options.out)
+    measure(table, options.verbs, options.readings, options.limit)
+    costs = table.costs
     for verb in options.verbs:
         own = [cost for cost in costs if cost.verb == verb]
         if own:
@@ -147,9 +174,6 @@ def main() -> None:
                 f" time ~ n^{time:.2f}, memory ~ n^{memory:.2f}"
             )
     if options.out is not None:
-        options.out.mkdir(parents=True, exist_ok=True)
-        text = json.dumps([asdict(cost) for cost in costs], indent=1)
-        (options.out / "growth.json").write_text(text + "\n", encoding="utf-8")
         drawn(costs, options.out / "growth.png")
 
 
