@@ -316,10 +316,12 @@ class GaugeCan:
 
     ``repeats``: it can be read as often as one likes, so that several readings show whether it
     rests; else somebody makes each, by a key or by typing. ``by_hand``: a person reads it off.
+    ``contacts``: it shows no number, only whether it touches: 1 where it does, 0 where not.
     """
 
     repeats: bool = True
     by_hand: bool = False
+    contacts: bool = False
 
 
 class Gauge(Protocol):

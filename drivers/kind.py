@@ -153,6 +153,8 @@ DeviceT = TypeVar("DeviceT", MotionController, Motors, PoseMover, Tracker, Gauge
 
 Takes = Literal["parameters", "actuators", "poses"]
 """What a controller takes: parameters and poses, or actuator values alone, or poses alone."""
+Tells = Literal["number", "contact"]
+"""What a gauge tells: a number, or only whether it touches."""
 
 
 @dataclass(frozen=True)
@@ -172,6 +174,8 @@ class Kind(Generic[DeviceT]):
         Of a controller: "parameters" if it opens a :class:`~drivers.interface.MotionController`,
         "actuators" for :class:`~drivers.interface.Motors`, "poses" for a
         :class:`~drivers.interface.PoseMover`; for these two the host computes the motion.
+    tells : str
+        Of a gauge: "number", or "contact" if it only says whether it touches.
     """
 
     says: str
@@ -179,3 +183,4 @@ class Kind(Generic[DeviceT]):
     open: Callable[[Surroundings], Awaitable[DeviceT]]
     address: Callable[[Mapping[str, Any]], str]
     takes: Takes = "parameters"
+    tells: Tells = "number"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 MACHINES = ("hexapod", "tripod", "ptm")
 """Machines that there are mocks of."""
-GAUGES = ("dial", "bar")
+GAUGES = ("dial", "bar", "touch")
 """Gauges that there are mocks of."""
 WITH_OWN_FILES = ("hexapod", "ptm")
 """Mechanisms whose mock takes a machine file of one's own: those with a controller on CANopen."""
@@ -61,7 +61,8 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     parser.add_argument(
         "--gauge", choices=GAUGES,
-        help="no tracker: a dial gauge on a plate, or a ball bar between nests, on a line",
+        help="no tracker: a dial gauge or a touch probe on a plate, or a ball bar between nests, "
+        "on a line",
     )  # fmt: skip
     parser.add_argument(
         "--pose", action="store_true",

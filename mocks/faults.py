@@ -36,6 +36,7 @@ Names, with what reads them:
 ``tracker-unsolicited-error``           one-shot: an Error packet with command Unknown
 ``gauge-silent``                        the gauge answers nothing: its battery
 ``gauge-held``                          the gauge answers its last number again and again
+``gauge-dead``                          a touch probe never says that it touches
 ``gauge-over``                          the gauge is out of its range
 ``gauge-noise``                         every other line of the gauge is garbage
 ``gauge-inch``                          somebody has switched the gauge to inches; its lines say so

@@ -2,7 +2,8 @@
 
 On a line it answers ``?`` with a number. A dial gauge sits in a nest of the platform and touches a
 plate on the base, which lies a little off and a little inclined; a telescopic ball bar is set
-between a nest of the platform and one of the base. Its zero is its own business.
+between a nest of the platform and one of the base. Its zero is its own business. A touch probe
+sits in a nest as well, above such a plate, and says only whether it touches.
 """
 
 import asyncio
@@ -22,6 +23,10 @@ TRAVEL = {"dial": (0.0, 12.7), "bar": (-25.0, 25.0)}
 BAR_WRONG_MM = 0.04
 """What the label of a bar, its length at zero, is off by."""
 DIAL_AT_PLATE = 6.35
+TRAVEL_MM, REPEATS_MM, BALL_MM, PLATE_BELOW_MM = 0.012, 0.001, 1.0, 8.0
+"""Of a touch probe: how far its ball is pushed before it says so, how well that repeats, its
+radius; how far the plate is below its ball at home."""
+TOUCHES, OPEN = "probe: TRIGGERED", "probe: open"
 PLATE_OFF_MM, PLATE_TILT = 0.25, (0.0012, -0.0008)
 _BACK = np.linspace(0.0, 4.0, 9)
 
@@ -37,7 +42,8 @@ class GaugeMock:
         self._last = ""
         self._count = 0
         home = world.nest_in_base(self.nest, np.array([clock.now()]))[0]
-        self.plate_z = round(float(home[2]), 1)
+        below = PLATE_BELOW_MM + BALL_MM if kind == "touch" else 0.0
+        self.plate_z = round(float(home[2]) - below, 1)
         self.bar_mm = self._usual_length(clock.now())
 
     def _usual_length(self, now: float) -> float:
@@ -64,6 +70,9 @@ class GaugeMock:
             return "\x00\xff#7&"
         if "gauge-held" in faults and self._last:
             return self._last
+        if self.kind == "touch":
+            self._last = self._felt()
+            return self._last
         shown = self._shown()
         low, high = TRAVEL[self.kind]
         if shown is None or "gauge-over" in faults or not low <= shown <= high:
@@ -71,6 +80,13 @@ class GaugeMock:
         shown = STEP_MM * round((shown + float(self._rng.normal(0.0, NOISE_MM))) / STEP_MM)
         self._last = self._text(-shown if "gauge-reversed" in faults else shown)
         return self._last
+
+    def _felt(self) -> str:
+        """Whether the ball is pushed in by more than the probe's travel."""
+        if "gauge-dead" in self._world.faults:
+            return OPEN
+        pushed = BALL_MM - float(self._above(np.array([self._clock.now()]))[0])
+        return TOUCHES if pushed > TRAVEL_MM + self._rng.normal(0.0, REPEATS_MM) else OPEN
 
     def _text(self, shown: float) -> str:
         faults = self._world.faults
@@ -94,30 +110,36 @@ class GaugeMock:
             at = self._world.nest_in_base(self.between[0], times)
             far = np.array(self._world.around.base_nests[self.between[1]])
             return np.asarray(np.linalg.norm(at - far, axis=1) - self.bar_mm - BAR_WRONG_MM)
+        return np.asarray(DIAL_AT_PLATE - self._above(times))
+
+    def _above(self, times: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        """How far the nest is above the plate, mm."""
         at = self._world.nest_in_base(self.nest, times)
         normal = np.array([*PLATE_TILT, 1.0])
-        above = (at - [0.0, 0.0, self.plate_z + PLATE_OFF_MM]) @ normal / np.linalg.norm(normal)
-        return np.asarray(DIAL_AT_PLATE - above)
+        off = at - [0.0, 0.0, self.plate_z + PLATE_OFF_MM]
+        return np.asarray(off @ normal / np.linalg.norm(normal))
 
     def site(self) -> dict[str, Any]:
         """What a site file says of it, and of the plate that it touches."""
         near = {} if self._world.kind == "hexapod" else {"near": 10.0}  # by their tolerances
-        common = {
-            **near,
-            "sigma": 0.002,
-            "lowest": TRAVEL[self.kind][0],
-            "highest": TRAVEL[self.kind][1],
-        }
+        plate = {
+            "normal": [0.0, 0.0, 1.0], "through": [0.0, 0.0, self.plate_z], "sigma": 0.5,
+            "tilt_sigma": 0.003,
+        }  # fmt: skip
+        if self.kind == "touch":
+            own = {
+                **near, "reads": "direction", "nest": self.nest, "plane": "plate", "sigma": 0.001,
+                "radius_mm": BALL_MM, "zero_sigma": 0.05, "clearance_mm": 3.0, "name": "probe",
+            }  # fmt: skip
+            return {"gauge": own, "planes": {"plate": plate}}
+        low, high = TRAVEL[self.kind]
+        common = {**near, "sigma": 0.002, "lowest": low, "highest": high}
         if self.kind == "bar":
             own = {"reads": "distance", "zero_at": self.bar_mm, "zero_sigma": 0.1, "name": "bar"}
             return {"gauge": {**common, **own}}
         own = {
             "reads": "direction", "nest": self.nest, "plane": "plate", "zero_at": DIAL_AT_PLATE,
             "sign": -1, "zero_sigma": 20.0, "clearance_mm": 8.0, "name": "dial",
-        }  # fmt: skip
-        plate = {
-            "normal": [0.0, 0.0, 1.0], "through": [0.0, 0.0, self.plate_z], "sigma": 0.5,
-            "tilt_sigma": 0.003,
         }  # fmt: skip
         return {"gauge": {**common, **own}, "planes": {"plate": plate}}
 
@@ -132,7 +154,10 @@ class GaugeServer(TcpDevice):
     def site(self) -> dict[str, Any]:
         """The tables of a site file."""
         tables = self.gauge.site()
-        link = {"kind": "lines", "source": self.address, "unit": "mm", "ask": "?\\n"}
+        link = {"kind": "lines", "source": self.address, "ask": "?\\n", "unit": "mm"}
+        if self.gauge.kind == "touch":
+            del link["unit"]
+            link |= {"kind": "contact", "touches": "TRIGGERED", "open": "open"}
         return {**tables, "gauge": {**link, "silence_s": 2.0, **tables["gauge"]}}
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from app.devices import kind_named, kind_names
 from app.files.device_settings import read_settings
+from app.files.site_probe import Search, read_search
 from calib.runs.sensing import Instrument, Plane
 from calib.toml_table import TomlTable
 from drivers.lines.number import ANGLES
@@ -29,6 +30,8 @@ class GaugeSite:
     ``sign`` * what it shows; ``lowest`` and ``highest`` bound what it can show. ``clearance_mm``
     is how far the platform is lifted along ``away`` (3,), base frame, before it moves on; zero for
     none. ``near`` is how far a number may be from where the nominal machine expects it.
+    ``search`` is there where it shows no number but only says whether it touches: what is measured
+    is then ``zero_at``, the radius of its ball, wherever it touches.
     """
 
     kind: str
@@ -50,6 +53,7 @@ class GaugeSite:
     near: float
     clearance_mm: float
     away: tuple[float, ...]
+    search: Search | None = None
 
     @property
     def own_zero(self) -> bool:
@@ -94,7 +98,9 @@ def read_gauge(
         )  # fmt: skip
     sigma = table.number("sigma", unit="mm or rad", above=0.0)
     plane, away = _touched(table, reads, planes)
-    axis = table.numbers("axis", 3, (0.0, 0.0, 1.0))
+    near = table.number("near", NEAR[unit], unit="mm or rad", above=0.0)
+    search = read_search(table, reads, plane, near) if kind.tells == "contact" else None
+    axis = table.numbers("axis", 3, (0.0, 0.0, 1.0)) if search is None else (0.0, 0.0, 1.0)
     instrument = Instrument(
         frame="base",
         axis=_direction(table, axis) if reads != "distance" and not plane else None,
@@ -102,14 +108,19 @@ def read_gauge(
         scale_sigma=table.optional_number("scale_sigma", above=0.0),
         model=table.text("model", name),
     )
-    low, high = _range(table)
+    low, high = _range(table) if search is None else (-np.inf, np.inf)
+    at, sign = (
+        (table.number("zero_at", 0.0, unit="mm or rad"), _sign(table))
+        if search is None
+        else (search.radius_mm, 1)
+    )
     own = GaugeSite(
         kind=name, serial=serial, settings=settings, address=kind.address(settings),
-        name=table.text("name", "gauge"), reads=reads, unit=unit, sigma=sigma,
+        name=table.text("name", "gauge"), reads=reads, unit=unit,
+        sigma=sigma if search is None else float(np.hypot(sigma, search.spread_mm)),
         instrument=instrument, plane=plane, nest=_nest(table, reads, nests[0]),
-        zero_at=table.number("zero_at", 0.0, unit="mm or rad"), sign=_sign(table),
-        pairs=_pairs(table, reads, *nests), lowest=low, highest=high,
-        near=table.number("near", NEAR[unit], unit="mm or rad", above=0.0),
+        zero_at=at, sign=sign, pairs=_pairs(table, reads, *nests), lowest=low, highest=high,
+        near=near, search=search,
         clearance_mm=table.number(
             "clearance_mm", CLEARANCE_MM if reads == "direction" else 0.0, unit="mm", least=0.0
         ),

@@ -87,14 +87,15 @@ def drawn_for(
     if site is None or site.gauge is None:
         return None
     gauge, bring = site.gauge, _bring(site, site.gauge)
-    lift = gauge.clearance_mm * np.array(gauge.away)
-    if bring is None and not np.any(lift):
+    heights = (gauge.clearance_mm, -gauge.search.below_mm if gauge.search else 0.0)
+    lifts = [height * np.array(gauge.away) for height in heights if height]
+    if bring is None and not lifts:
         return None
 
     def in_range(poses: Poses) -> BoolArray:
         return np.array([shows(site, gauge, pose) for pose in poses.to_xyz_rpy().T.tolist()])
 
-    return gauge_poses(site.machine, bring, lift, margin=margin, shows=in_range)
+    return gauge_poses(site.machine, bring, lifts, margin=margin, shows=in_range)
 
 
 def _bring(site: Site, gauge: GaugeSite) -> Bring | None:

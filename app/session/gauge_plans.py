@@ -2,7 +2,8 @@
 
 A place is approached and left along the direction of the gauge (``LIFTED`` behind its label). At
 the first place, and wherever a number comes a second time, the platform is lifted a little
-(``RAISED``): a gauge that is alive says so, with its sign and its unit.
+(``RAISED``): a gauge that is alive says so, with its sign and its unit. A probe that only says
+whether it touches is lowered from above, at most to ``DEEPEST``.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,8 +19,9 @@ from app.session.plan import Plan, PlanWriter
 from app.session.spans import stays_in_range, within
 from calib.errors import BadInput
 
-LIFTED, RAISED = "+", "^"
-"""Behind the label of a pose: lifted to move on, raised to see whether the gauge follows."""
+LIFTED, RAISED, DEEPEST = "+", "^", "-"
+"""Behind the label of a pose: lifted to move on, raised to see whether the gauge follows, as low as
+a probe is lowered."""
 RAISE_MM = 0.3
 POSITION = {"x", "y", "z"}
 
@@ -72,11 +74,21 @@ class Manner:
 
 
 def _lifted(site: Site, gauge: GaugeSite, poses: Mapping[str, Pose]) -> dict[str, Pose]:
-    """Each pose lifted, and raised; nothing where the machine cannot, or need not."""
+    """Each pose lifted, raised or lowered; nothing where the machine cannot, or need not."""
     lifts = gauge.clearance_mm > 0.0 and set(site.machine.task.coordinates) >= POSITION
+    if not lifts and gauge.search is not None:
+        raise BadInput(
+            "a probe that says whether it touches must be lowered, and this cannot be",
+            place=site.source,
+            remedy="See clearance_mm, and whether the machine is commanded x, y and z",
+        )
     if not lifts:
         return {}
-    heights = {LIFTED: gauge.clearance_mm, RAISED: min(RAISE_MM, gauge.clearance_mm)}
+    heights = {LIFTED: gauge.clearance_mm}
+    if gauge.search is None:
+        heights[RAISED] = min(RAISE_MM, gauge.clearance_mm)
+    else:
+        heights[DEEPEST] = -gauge.search.below_mm
     return {
         f"{label}{sign}": _moved(pose, np.array(gauge.away) * height)
         for label, pose in poses.items()
@@ -99,7 +111,7 @@ def _places(
             if visited and visited % options.again_every == 0:
                 _place(plan, gauge, first, f"again-{visited}", cycle, options, lifts)
             _place(plan, gauge, label, "", cycle, options, lifts)
-            if not visited and lifts and not gauge.by_hand:
+            if not visited and lifts and not gauge.by_hand and gauge.search is None:
                 plan.add(
                     kinds.FOLLOWS, label, pose=f"{label}{RAISED}", of=label, nest=gauge.nest
                 )  # fmt: skip
@@ -122,7 +134,11 @@ def _place(
         args["again"] = True
     name = f"{label}-{about}" if about else label
     says = f"read place {label} again" if about else f"read place {label}"
-    plan.add(kinds.TOUCH, name, says, pose=label, nest=gauge.nest, **args)
+    if gauge.search is None:
+        plan.add(kinds.TOUCH, name, says, pose=label, nest=gauge.nest, **args)
+    else:
+        low = f"{label}{DEEPEST}"
+        plan.add(kinds.PROBE, name, says, pose=low, of=label, nest=gauge.nest, **args)
     if lifts:
         plan.add(kinds.MOVE, f"{label}-up", "lift", pose=args["above"])
 

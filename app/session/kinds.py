@@ -60,6 +60,7 @@ TRUTH = StepKind("truth", "the mock's true pose at {pose}", moves_to="pose", oft
 GAUGE = StepKind("gauge", "does the gauge answer?", every_time=True, skippable=False)
 APART = StepKind("apart", "take it off: the machine moves", skippable=False)
 TOUCH = StepKind("touch", "read it at {pose}", moves_to="pose", often=True)
+PROBE = StepKind("probe", "lower it at {of} until it touches", moves_to="pose", often=True)
 FOLLOWS = StepKind("follows", "does the gauge follow at {of}?", moves_to="pose")
 MARK = StepKind("mark", "leave a mark at {pose}", moves_to="pose")
 BETWEEN = StepKind("between", "measure between marks {pose} and {pose2}", often=True)
@@ -69,7 +70,7 @@ KINDS: dict[str, StepKind] = {
     kind.name: kind
     for kind in (
         CONNECT, CHECK_PATH, TRACKER, DRIVES, WARM_UP, HOME, MOVE, CARRY, CONFIRM, DIRECTIONS, READ,
-        REFERENCE, DRIFT, TWO_FACE, TRUTH, GAUGE, APART, TOUCH, FOLLOWS, MARK, BETWEEN, REST,
+        REFERENCE, DRIFT, TWO_FACE, TRUTH, GAUGE, APART, TOUCH, PROBE, FOLLOWS, MARK, BETWEEN, REST,
     )
 }  # fmt: skip
 """Every kind by its word."""

@@ -4,7 +4,7 @@ The zero of a gauge and the place of a plate are taken as known: three to five u
 machine's, which a campaign of some dozen readings determines with the rest.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -137,15 +137,16 @@ def to_span(ends: tuple[Array, Array], span: tuple[float, float]) -> Bring:
 def gauge_poses(
     machine: Machine,
     bring: Bring | None,
-    lift: Array,
+    lifts: Sequence[Array],
     *,
     margin: Margin | None = None,
     shows: Callable[[Poses], BoolArray] | None = None,
 ) -> Callable[[int, np.random.Generator], PoseSet]:
     """How poses are drawn at which a gauge is in range, and from which it can be lifted.
 
-    ``lift`` (3,) is how far the platform moves to let go, mm, base frame; ``shows`` whether the
-    gauge is in range, where the machine cannot move as it is to be brought.
+    ``lifts``, (3,) each, are how far the platform moves to let go, and as deep as it is lowered,
+    mm, base frame; ``shows`` is whether the gauge is in range, where the machine cannot move as it
+    is to be brought.
 
     Raises
     ------
@@ -165,7 +166,7 @@ def gauge_poses(
                 found = found.take(_inside(found) & reachable(machine, found.configuration, margin))
             if not moves and shows is not None:
                 found = found.take(shows(found.poses))
-            if moves and np.any(lift):
+            for lift in lifts if moves else ():
                 up = _moved(found, np.repeat(lift[:, None], found.count, axis=1))
                 found = found.take(reachable(machine, up.configuration, margin))
             kept.append(found)
@@ -178,7 +179,7 @@ def gauge_poses(
         raise BadInput(
             f"only {have} of {drawn} poses bring the gauge into its range and let it be lifted",
             place=machine.source,
-            remedy="See where plane or nests are, zero_at, lowest, highest and clearance_mm",
+            remedy="See where plane or nests are, zero_at, lowest, highest, clearance_mm, below_mm",
         )
 
     return draw

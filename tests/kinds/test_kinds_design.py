@@ -107,7 +107,7 @@ def test_the_pairs_of_marks_that_are_chosen_tell_more_than_others(capsys) -> Non
 def test_poses_are_brought_to_where_a_bar_is_in_range() -> None:
     machine = load("hexapod")
     ends = (np.array([[0.0], [100.0], [0.0]]), np.array([[0.0], [260.0], [-30.0]]))
-    draw = gauge_poses(machine, to_span(ends, (299.0, 301.0)), np.zeros(3))
+    draw = gauge_poses(machine, to_span(ends, (299.0, 301.0)), ())
     found = draw(25, np.random.default_rng(2))
     at = found.poses.position + np.einsum("ijn,j->in", found.poses.rotation, ends[0][:, 0])
     length = np.linalg.norm(at - ends[1], axis=0)

@@ -12,6 +12,7 @@ from app.session.routines.following import follows
 from app.session.routines.gauging import apart, between_marks, gauge, mark, touch
 from app.session.routines.moving import home, move
 from app.session.routines.preparing import check_path, connect, drives, rest, tracker, warm_up
+from app.session.routines.probing import probe
 from app.session.routines.reading import read
 from app.session.routines.referencing import drift, reference, two_face
 from app.session.routines.truth import truth
@@ -38,6 +39,7 @@ ROUTINES: dict[StepKind, Routine] = {
     kinds.TRUTH: truth,
     kinds.GAUGE: gauge,
     kinds.TOUCH: touch,
+    kinds.PROBE: probe,
     kinds.FOLLOWS: follows,
     kinds.APART: apart,
     kinds.MARK: mark,

@@ -59,7 +59,7 @@ async def number(work: Work, own: GaugeSite, about: About) -> tuple[float, str]:
         except (MeasurementError, Silence) as none:
             if isinstance(none, Silence):
                 work.station.check()
-            await _without(work, about, none, tries)
+            await without(work, about, none, tries)
             continue
         value = own.zero_at + own.sign * reading.value
         kept = await _judged(work, own, about, value, reading.said, tries)
@@ -107,21 +107,22 @@ def _typed(work: Work, about: About):  # type: ignore[no-untyped-def]
     async def ask(wrong: str, typed: str) -> str:
         text = f"{wrong}{about.where[:1].upper()}{about.where[1:]}: what does the gauge show?"
         answer = await work.ask(text, (LEAVE, STOP), None, typed=typed)
-        _leave_or_stop(answer, about)
+        leave_or_stop(answer, about)
         return answer
 
     return ask
 
 
-def _leave_or_stop(answer: str, about: About) -> None:
+def leave_or_stop(answer: str, about: About) -> None:
+    """End the step where the operator wants that; raises LeftOut, StoppedByOperator."""
     if answer == STOP:
         raise StoppedByOperator(f"stopped at {about.where}")
     if answer == LEAVE:
         raise LeftOut(f"{about.where} was left out by the operator")
 
 
-async def _without(work: Work, about: About, none: DeviceError, tries: int) -> None:
-    """There is no number: again, then ask."""
+async def without(work: Work, about: About, none: DeviceError, tries: int) -> None:
+    """There is no number: again, then ask; raises ``none`` where nobody can be asked."""
     work.alarm("gauge", f"{about.where}: {none.what}", none.remedy)
     if tries == 1 and isinstance(none, Silence) and work.gauge.can.repeats:
         return  # one answer may get lost
@@ -131,7 +132,7 @@ async def _without(work: Work, about: About, none: DeviceError, tries: int) -> N
         None,
         none,
     )
-    _leave_or_stop(answer, about)
+    leave_or_stop(answer, about)
 
 
 async def _judged(
@@ -171,7 +172,7 @@ async def _judged(
     answer = await work.ask(
         f"At {about.where} the gauge shows {why}.", (AGAIN, *take, *keep, LEAVE, STOP), None, fault
     )
-    _leave_or_stop(answer, about)
+    leave_or_stop(answer, about)
     if answer == KEEP:
         return value
     return meant if take and answer == take[0] else None

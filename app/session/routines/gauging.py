@@ -42,7 +42,7 @@ async def touch(work: Work, step: Step) -> Done:
     LeftOut
         Where the operator leaves the place out.
     """
-    own, label, args = _own(work), step.args["pose"], step.args
+    own, label, args = own_gauge(work), step.args["pose"], step.args
     told = await in_band(work)
     pair = (args["nest"], args["nest2"]) if args.get("nest2") else None
     if pair is not None:
@@ -61,7 +61,7 @@ async def touch(work: Work, step: Step) -> Done:
         await alive(work, own, label)
         value, said = await number(work, own, about)
     again = bool(args.get("again"))
-    return _done(work, own, about, (value, said), told, args.get("cycle"), again)
+    return taken_down(work, own, about, (value, said), told, args.get("cycle"), again)
 
 
 async def mark(work: Work, step: Step) -> Done:
@@ -76,12 +76,12 @@ async def mark(work: Work, step: Step) -> Done:
 
 async def between_marks(work: Work, step: Step) -> Done:
     """Read the distance between two marks that were left."""
-    own, args = _own(work), step.args
+    own, args = own_gauge(work), step.args
     one, two = args["pose"], args["pose2"]
     nests = (args["nest"], args["nest2"])
     expected = between(work.site, (work.pose(one), work.pose(two)), nests)
     about = About(_where(step), one, args["nest"], args["nest2"], two, expected)
-    return _done(work, own, about, await number(work, own, about), await in_band(work), None)
+    return taken_down(work, own, about, await number(work, own, about), await in_band(work), None)
 
 
 async def apart(work: Work, step: Step) -> Done:
@@ -109,7 +109,8 @@ async def _span(work: Work, label: str, pair: tuple[str, str], *, stays: bool) -
         memory.spanned = pair
 
 
-def _own(work: Work) -> GaugeSite:
+def own_gauge(work: Work) -> GaugeSite:
+    """The site's gauge; raises NotReady where it has none."""
     if work.site.gauge is None:
         raise NotReady(
             "this site has no gauge", device="gauge", remedy="Go on with the site of the session"
@@ -126,7 +127,7 @@ def _where(step: Step) -> str:
     return f"place {args['pose']}"
 
 
-def _done(
+def taken_down(
     work: Work, own: GaugeSite, about: About, read: tuple[float, str],
     told: dict[str, float], cycle: int | None, again: bool = False,
 ) -> Done:  # fmt: skip
@@ -163,7 +164,9 @@ def _watch_zero(work: Work, own: GaugeSite, about: About, value: float) -> None:
     first = next((row for row in numbers(work.journal) if row.pose == about.label), None)
     if first is None or own.unit != "mm":
         return
-    shift, limit = value - float(first.raw[GAUGE]["value"]), work.limits.drift_mm
+    was = first.raw[GAUGE]
+    shift = value - about.expected - (float(was["value"]) - float(was["expected"]))
+    limit = work.limits.drift_mm
     work.tell(DriftChecked(abs(shift), limit, work.clock.now()))
     if abs(shift) > limit:
         work.alarm(

@@ -47,9 +47,14 @@ async def go(work: Work, label: str) -> None:
     knows where the machine was sent, which the direction of approach depends on. Where a person
     moves the machine it is written on arrival, with the actuator values that were reached.
     """
+    await approach(work, label, work.pose(label))
+    work.memory.standing_at = label
+
+
+async def approach(work: Work, label: str, pose: Pose) -> None:
+    """As :func:`go`, to a pose on the way to one of the plan: the machine then stands at none."""
     memory = work.memory
     memory.standing_at, memory.settled = None, False
-    pose = work.pose(label)
     if isinstance(work.controller, HostedController):
         work.controller.told({"delay_s": memory.delay_s, **await channels(work)})
         work.controller.ask_with(partial(_ask_for_pose, work, label))
@@ -71,7 +76,6 @@ async def go(work: Work, label: str) -> None:
         # Where a person brought it is known once it is there, and may be beside what was asked.
         q = tuple(one.position for one in (await work.controller.state()).actuators)
         _write_move(work, label, q)
-    memory.standing_at = label
     memory.arrived_s = work.clock.now()
     work.tell(LivePose(q, q, moving=False))
 
