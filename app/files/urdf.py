@@ -17,6 +17,8 @@ from calib.quantity import LARGEST, in_short, is_meant
 
 MOVING = {"revolute": True, "continuous": True, "prismatic": False}
 """Kinds of joints that can be driven, and whether they turn."""
+FARTHEST = 3.0
+"""Lengths of the whole arm: a centre of mass farther from its joint is a slip of the file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +58,15 @@ class UrdfArm:
     joints: tuple[UrdfJoint, ...]
     masses: tuple[UrdfMass, ...] = ()
     gears: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def reach(self) -> float:
+        """The longest that the chain can be if nothing slides, m."""
+        return float(sum(np.linalg.norm(one.xyz) for one in self.joints))
+
+    def nowhere(self, mass: UrdfMass) -> bool:
+        """Whether a centre of mass is so far away that its link cannot reach there."""
+        return bool(np.linalg.norm(mass.centre) > FARTHEST * max(self.reach, 0.1))
 
 
 def read_urdf(text: str, source: str, base: str = "", tip: str = "") -> UrdfArm:
@@ -106,7 +117,7 @@ def _gears(root: ET.Element, source: str) -> dict[str, float]:
 def xml_of(text: str, source: str) -> ET.Element:
     """The root of a URDF; raises BadInput for what is none."""
     try:
-        root = ET.fromstring(text)
+        root = ET.fromstring(text.lstrip("\ufeff \t\r\n"))  # as the parsers of ROS take it
     except ET.ParseError as error:
         raise BadInput(
             f"not XML: {error}", place=source, remedy="Expand xacro first: xacro ARM.xacro"

@@ -35,6 +35,8 @@ TRIED = 400
 SEED = 1
 WIDEST = float(np.pi / 2)
 """Farthest from zero that a joint is at home, rad."""
+LEFT_OUT = "# left out: the mass"
+"""Begins the comment about a link whose centre of mass cannot be where the URDF has it."""
 BOX_MM, BOX_RAD = 0.08, float(np.deg2rad(15.0))
 """Half of the workspace box: a part of the arm's length, and an angle."""
 
@@ -157,15 +159,25 @@ def _gear(arm: UrdfArm, one: UrdfJoint) -> str:
 def _links(arm: UrdfArm) -> dict[str, str]:
     """Names of what stands behind the joints that carry a mass."""
     moving = [one.name for one in arm.joints if one.kind in MOVING]
-    return {one.joint: f"link{moving.index(one.joint) + 1}" for one in arm.masses}
+    return {
+        one.joint: f"link{moving.index(one.joint) + 1}"
+        for one in arm.masses
+        if not arm.nowhere(one)
+    }
 
 
 def _masses(arm: UrdfArm) -> list[str]:
     """What the links weigh, as traits."""
     names = _links(arm)
-    lines = ["[limbs.arm.traits.masses]"] if arm.masses else []
+    lines = ["[limbs.arm.traits.masses]"] if names else []
     for number, one in enumerate(arm.masses, start=1):
         centre = [round(1000.0 * float(v), 6) for v in one.centre]
+        if arm.nowhere(one):
+            lines.append(
+                f"{LEFT_OUT} of {plain(one.link)}, {one.kg!r} kg: the URDF has its centre "
+                f"{float(np.linalg.norm(one.centre)):.3g} m from {plain(one.joint)}"
+            )
+            continue
         lines.append(
             f'm{number} = {{ behind = "{names[one.joint]}", mass_kg = {one.kg!r}, '
             f"com = {centre} }}  # {re.sub(r'[^ -~]', '', one.link)}"

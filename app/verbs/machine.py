@@ -164,7 +164,7 @@ def import_(
     complete does; home is a pose far from singular ones. xacro files are expanded first.
     """
     from app.files.machines import load_machine
-    from app.jobs.urdf import machine_of_urdf
+    from app.jobs.urdf import LEFT_OUT, machine_of_urdf
 
     if out.exists() and not force:
         raise BadInput("there is such a file already", place=str(out), remedy="Add --force.")
@@ -181,6 +181,9 @@ def import_(
     out.write_text(text, encoding="utf-8", newline="\n")
     machine = load_machine(str(out))
     answer.say(f"written to {out}")
+    for line in text.splitlines():
+        if line.startswith(LEFT_OUT):
+            click.echo(f"{line[2:3].upper()}{line[3:]}.")
     click.echo(
         f"{machine.name}: {len(machine.actuators)} actuators, {len(machine.parameters)} parameters."
         f"\nNext: pkmcal machine draw {out}; pkmcal machine check {out}"

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import pkmcal
+from app.cli import run
 from app.files.machines import load_machine
 from app.jobs.urdf import machine_of_urdf
 from calib.effects import not_defined
@@ -47,6 +48,21 @@ def test_masses_and_gears_come_with_the_urdf(files: dict[str, Path]) -> None:
     assert {actuator.gear for actuator in machine.actuators} == {public_arms.GEAR}
     assert "leg-compliance" in not_defined(machine)["joint-sag"]
     assert "gear = 101" in not_defined(load_machine(str(files["plain"])))["gear-cyclic"]
+
+
+def test_a_centre_of_mass_where_no_link_reaches_is_left_out_and_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As in a published URDF, whose first line is empty as well."""
+    whole = public_arms.heavy_ur5e()
+    place = next(iter(re.findall(r'<inertial>.*?xyz="(.*?)"', whole, re.DOTALL)))
+    text = "\n" + whole.replace(f'xyz="{place}"', 'xyz="500.2 0.002 0.0"', 1)
+    (tmp_path / "arm.urdf").write_text(text)
+    code = run(["machine", "import", f"{tmp_path / 'arm.urdf'}", "--out", f"{tmp_path / 'a.toml'}"])
+    said = capsys.readouterr().out
+    machine = load_machine(str(tmp_path / "a.toml"))
+    assert code == 0 and "Left out: the mass of" in said and "500 m" in said
+    assert 0.0 < link_mass_kg(machine) < sum(public_arms.UR5E_KG)
 
 
 def test_links_pull_at_the_joints_as_their_centres_of_mass_say(
