@@ -48,6 +48,11 @@ def use(compiled: bool) -> None:
     _wanted = compiled
 
 
+def wanted() -> bool:
+    """Whether what is compiled may be used: not within :func:`reference`."""
+    return _wanted
+
+
 @contextmanager
 def reference() -> Iterator[None]:
     """Within it numpy alone does the work."""

@@ -9,51 +9,20 @@ state x = (z, u), the reading y = H x + w and the state's covariance P,
 and log det C is the sum of log det S (Harvey 1989, 3.4). The cost is linear in the readings.
 Readings that share nothing but their visit are filtered visit by visit, all visits at once.
 
-What hangs on how the readings were taken alone is laid out once for all sizes of the noise; of a
-step only the covariance (for the gains) and the state (for the readings) are carried on one by one,
-everything else is done for all steps together.
+What hangs on how the readings were taken alone is laid out once for all sizes of the noise; the
+steps themselves are in :mod:`calib.noise.filtering`.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
-from calib.arrays import Array, BoolArray, IntArray
+from calib.arrays import Array, IntArray
 from calib.noise.component import Noise, Taking
+from calib.noise.filtering import Filters, Layout, filters, innovations
 
-ROOM, ABREAST = 250_000, 32
-"""Numbers that the states of steps may hold while columns are filtered, and how many columns go
-together: as many steps at once as there is room for, so that the time is linear in the readings."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Layout:
-    """B sequences of readings, T steps long, with an n-fold state (n may be 3: no visits).
-
-    ``reading`` (T, B), ``there`` (T, B): which, and whether there is one; ``new`` (T, B): whether a
-    visit begins; ``seen`` (T, B, 3, n): H, nought where there is no reading.
-    """
-
-    reading: IntArray
-    there: BoolArray
-    new: BoolArray
-    seen: Array
-
-
-@dataclass(frozen=True, eq=False)
-class _Filters:
-    """Gains and spreads of all steps.
-
-    ``carry`` (T, B, n, n) and ``take`` (T, B, n, 3): the state predicted for the next step from the
-    one predicted for this and from the reading; ``white`` (T, B, 3, 3): S^-1/2; ``spread``
-    (T, B, 3): the diagonal of S^1/2.
-    """
-
-    carry: Array
-    take: Array
-    white: Array
-    spread: Array
+ABREAST = 64
+"""Columns that are filtered together: memory is that of so many, whatever their number."""
 
 
 class Whitening:
@@ -76,7 +45,7 @@ class Whitening:
             own_log_det = 2.0 * float(np.sum(np.log(np.diagonal(root, axis1=1, axis2=2))))
             taking = taking.corrected(self._own) if noise.visit > 0.0 else taking
         self._plain = noise.tau_s <= 0.0 and noise.visit <= 0.0
-        self._layout: _Layout | None = None
+        self._layout: Layout | None = None
         self._chain: tuple[IntArray, Array] | None = None
         if self._plain:
             self.log_det = 2.0 * float(taking.held().sum()) * float(np.log(noise.scale))
@@ -111,31 +80,16 @@ class Whitening:
             out[:, :, order] = (flat[:, :, order] - rho * before) / left
             return out.reshape(columns.shape)
         assert self._layout is not None
-        _, batch, _, size = self._layout.seen.shape
-        chunk = max(1, min(ABREAST, ROOM // (batch * size)))
         parts = [
-            self._filtered(self._layout, flat[k : k + chunk])
-            for k in range(0, flat.shape[0], chunk)
+            self._filtered(self._layout, flat[k : k + ABREAST])
+            for k in range(0, flat.shape[0], ABREAST)
         ]
         return np.concatenate(parts).reshape(columns.shape) if parts else columns
 
-    def _filtered(self, layout: _Layout, flat: Array) -> Array:
+    def _filtered(self, layout: Layout, flat: Array) -> Array:
         """Innovations of columns (k, 3, A)."""
         rows = np.ascontiguousarray(np.moveaxis(flat, 0, -1).swapaxes(0, 1))
-        out = np.zeros_like(rows)
-        steps, batch, _, size = layout.seen.shape
-        at_once = max(1, ROOM // (batch * size * flat.shape[0]))
-        state = np.zeros((batch, size, flat.shape[0]))
-        for first in range(0, steps, at_once):
-            part = slice(first, first + at_once)
-            there, readings = layout.there[part], rows[layout.reading[part]]
-            states = self._filters.take[part] @ readings
-            for step, carry in enumerate(self._filters.carry[part]):
-                after = carry @ state
-                after += states[step]
-                states[step], state = state, after
-            white = self._filters.white[part] @ (readings - layout.seen[part] @ states)
-            out[layout.reading[part][there]] = white[there]
+        out = innovations(layout, self._filters, rows)
         return np.asarray(np.moveaxis(out.swapaxes(0, 1), -1, 0))
 
 
@@ -150,7 +104,7 @@ def _times(lower: Array, columns: Array) -> Array:
 
 
 @lru_cache(maxsize=8)
-def _laid_out(taking: Taking, ties: bool, visits: bool) -> _Layout:
+def _laid_out(taking: Taking, ties: bool, visits: bool) -> Layout:
     """The sequences of readings, side by side."""
     sequences = _sequences(taking, taking.order, ties)
     length = np.array([one.size for one in sequences])
@@ -171,13 +125,13 @@ def _laid_out(taking: Taking, ties: bool, visits: bool) -> _Layout:
         motions = taking.motions.transpose(2, 1, 0)[reading]
         seen[..., first:] = motions * (taking.visit[reading] >= 0)[..., None, None]
     seen *= there[..., None, None]
-    return _Layout(reading, there, (visit >= 0) & (visit != before), seen)
+    return Layout(reading, there, (visit >= 0) & (visit != before), seen)
 
 
-def _filters(taking: Taking, layout: _Layout, noise: Noise) -> _Filters:
-    """Run the covariances through all sequences."""
-    seen, ties = layout.seen, noise.tau_s > 0.0
-    steps, batch, _, size = seen.shape
+def _filters(taking: Taking, layout: Layout, noise: Noise) -> Filters:
+    """Run the covariances of a noise through all sequences."""
+    ties = noise.tau_s > 0.0
+    steps, batch, _, size = layout.seen.shape
     first = 3 if ties else 0
     variance, correlated = noise.scale**2, noise.share if ties else 0.0
     fade = np.ones((steps, batch, size))
@@ -189,27 +143,8 @@ def _filters(taking: Taking, layout: _Layout, noise: Noise) -> _Filters:
         fresh[..., :first] = correlated * variance * (1.0 - fade[..., :first] ** 2)
     fade[..., first:][layout.new] = 0.0
     fresh[..., first:][layout.new] = noise.visit**2
-    fades = fade[..., :, None] * fade[..., None, :]
-    added = fresh[..., None] * np.eye(size)
-    white = np.where(layout.there, (1.0 - correlated) * variance, 1.0)[..., None, None] * np.eye(3)
-    back = np.ascontiguousarray(seen.swapaxes(-1, -2))
-    total = np.empty((steps, batch, 3, 3))
-    gain = np.empty((steps, batch, size, 3))
-    covariance = np.zeros((batch, size, size))
-    for step in range(steps):
-        covariance *= fades[step]
-        covariance += added[step]
-        reach = covariance @ back[step]
-        total[step] = seen[step] @ reach + white[step]
-        gain[step] = reach @ np.linalg.inv(total[step])
-        covariance -= gain[step] @ reach.swapaxes(1, 2)
-        covariance = 0.5 * (covariance + covariance.swapaxes(1, 2))
-    factor = np.linalg.cholesky(total)
-    carry = np.eye(size) - gain @ seen
-    carry[:-1] *= fade[1:, :, :, None]
-    gain[:-1] *= fade[1:, :, :, None]
-    spread = np.diagonal(factor, axis1=-2, axis2=-1)
-    return _Filters(carry, gain, np.linalg.inv(factor), spread)
+    own = np.where(layout.there, (1.0 - correlated) * variance, 1.0)
+    return filters(layout, fade, fresh, own)
 
 
 def _sequences(taking: Taking, order: IntArray, ties: bool) -> list[IntArray]:

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from calib.mechanism import kernel
 from calib.noise import Noise, Taking, Whitening
+from calib.noise.filtering import compiled
 
 READINGS, ACTUATORS = 30, 4
 CASES = [
@@ -55,6 +57,36 @@ def test_whitened_columns_have_the_inner_products_of_the_inverse_covariance(nois
     flat = columns.reshape(5, -1)
     np.testing.assert_allclose(white @ white.T, flat @ np.linalg.solve(whole, flat.T), atol=1e-9)
     assert whitening.log_det == pytest.approx(np.linalg.slogdet(whole)[1], abs=1e-9)
+
+
+@pytest.mark.skipif(not compiled(), reason="the filter was not compiled here")
+@pytest.mark.parametrize("noise", CASES, ids=str)
+def test_the_compiled_filter_whitens_as_numpy_does(noise):
+    rng = np.random.default_rng(3)
+    taken, columns = taking(rng), rng.standard_normal((70, 3, READINGS))
+    whitening = Whitening(taken, noise)
+    white = whitening.apply(columns)
+    with kernel.reference():
+        reference = Whitening(taken, noise)
+        expected = reference.apply(columns)
+    np.testing.assert_allclose(white, expected, rtol=0, atol=1e-12)
+    assert whitening.log_det == pytest.approx(reference.log_det, abs=1e-11)
+
+
+@pytest.mark.skipif(not compiled(), reason="the filter was not compiled here")
+def test_arrays_that_do_not_go_together_are_refused():
+    from calib.noise import _filter
+
+    two, three = np.zeros(2), np.zeros(3)
+    with pytest.raises(ValueError, match="numbers are given"):
+        _filter.gains(1, 1, 1, two, *[two] * 6)
+    with pytest.raises(ValueError, match="too many"):
+        _filter.gains(10**6, 10**6, 9, three, *[two] * 6)
+    with pytest.raises(ValueError, match="no such reading"):
+        _filter.innovations(1, 1, 0, 1, 1, np.array([1]), np.zeros(0), np.zeros(0), np.zeros(0),
+                            np.zeros(9), three, np.zeros(3))  # fmt: skip
+    with pytest.raises(TypeError):
+        _filter.gains(1, 1, 1, np.zeros(3, dtype=int), *[two] * 6)
 
 
 def test_a_long_run_keeps_its_covariances():
