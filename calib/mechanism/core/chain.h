@@ -57,15 +57,26 @@ INLINE void quarter_turns(Frame *f, int axis, int count) {
 }
 
 INLINE void pass(Frame *f, const Segment *s) {
-    for (int k = 0; k < 3; k++) {
-        if (s->axes & (1 << k)) go(f, k, s->point[k]);
-    }
+    if (s->axes & 1) go(f, 0, s->point[0]);
+    if (s->axes & 2) go(f, 1, s->point[1]);
+    if (s->axes & 4) go(f, 2, s->point[2]);
     if (!s->turned) return;
     for (int i = 0; i < 3; i++) {
         const vec a = f->column[0][i], b = f->column[1][i], c = f->column[2][i];
         for (int j = 0; j < 3; j++)
             f->column[j][i] = a * s->rotation[0][j] + b * s->rotation[1][j] + c * s->rotation[2][j];
     }
+}
+
+/* Begin behind the first segment. */
+INLINE void begin_behind(Frame *f, const Segment *s) {
+    begin(f);
+    for (int i = 0; i < 3; i++) {
+        if (s->axes & (1 << i)) f->point[i] = s->point[i];
+    }
+    if (!s->turned) return;
+    for (int j = 0; j < 3; j++)
+        for (int i = 0; i < 3; i++) f->column[j][i] = s->rotation[i][j];
 }
 
 INLINE void cross(const vec *a, const vec *b, vec *out) {
@@ -158,8 +169,7 @@ static void fix(const Machine *m, const Limb *b, const vec *parameters, Segment 
 /* Walk along a limb by its segments: the end frame, and the screws of its joints. */
 INLINE void walk(const Machine *m, const Limb *b, const Segment *segment, const vec *rest,
                  const State *at, Screw *screw, Frame *end) {
-    begin(end);
-    pass(end, segment);
+    begin_behind(end, segment);
     for (int j = 0; j < b->joints; j++) {
         const Element *e = &m->element[m->moving[b->joint + j]];
         for (int i = 0; i < 3; i++) {

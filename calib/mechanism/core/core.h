@@ -46,6 +46,13 @@ static void take_limb(Shelf *s, const Machine *m, const Limb *b, LimbWork *w) {
     w->segment = take(s, b->joints + 1, sizeof(Segment));
 }
 
+static void take_lone(Shelf *s, const Limb *b, LoneWork *w) {
+    if (!is_lone(b)) return;
+    w->twist = take_vecs(s, 6 * b->joints);
+    w->held = take_vecs(s, b->joints);
+    w->value = take_vecs(s, 2 * b->joints);
+}
+
 /* Places everything; called once to measure and once to lay out. */
 static void lay_out(Shelf *s, const Machine *m, const Job *job, Room *r, int measuring) {
     Work *w = &r->work;
@@ -53,6 +60,7 @@ static void lay_out(Shelf *s, const Machine *m, const Job *job, Room *r, int mea
     DrivenWork *driven = take(s, m->limbs, sizeof(DrivenWork));
     LimbWork spare;
     DrivenWork spare_driven;
+    LoneWork spare_lone;
     int longest = 0;
     for (int i = 0; i < m->limbs; i++) {
         const Limb *b = &m->limb[i];
@@ -61,6 +69,8 @@ static void lay_out(Shelf *s, const Machine *m, const Job *job, Room *r, int mea
         take_reflectors(s, &d->q, b->wrenches, b->wrenches);
         d->twist = take_vecs(s, 6 * b->wrenches);
         d->step = take_vecs(s, b->wrenches);
+        d->lone = take(s, is_lone(b), sizeof(LoneWork));
+        take_lone(s, b, measuring ? &spare_lone : d->lone);
         if (b->elements > longest) longest = b->elements;
     }
     w->limb = limbs;
@@ -126,6 +136,8 @@ static void place(const Job *job, const Place *from, State *at, long first, int 
     place_rows(from->strain, m->strains, from->each, N, first, n, at->strain);
 }
 
+#define TOGETHER 4 /* outputs of a series that are summed side by side */
+
 /* Outputs y of a series for inputs x (with room for their products); zero where it says nothing. */
 static void sum_series(const double *numbers, int inputs, int outputs, vec *x, vec *y) {
     const double *per_unit = numbers, *linear = per_unit + outputs;
@@ -136,13 +148,24 @@ static void sum_series(const double *numbers, int inputs, int outputs, vec *x, v
     for (int i = 0; i < inputs; i++) product[k++] = x[i] * x[i];
     for (int i = 0; i < inputs; i++)
         for (int j = 0; j < i; j++) product[k++] = x[i] * x[j];
-    for (int o = 0; o < outputs; o++) {
-        vec first = splat(0.0), second = splat(0.0);
-        for (int i = 0; i < inputs; i++) first += linear[o * inputs + i] * x[i];
-        for (int i = 0; i < products; i++) second += quadratic[o * products + i] * product[i];
-        first_most = larger(magnitude(first) * per_unit[o], first_most);
-        second_most = larger(magnitude(second) * per_unit[o], second_most);
-        y[o] = first + second;
+    for (int o = 0; o < outputs; o += TOGETHER) {
+        const double *row[TOGETHER], *square[TOGETHER];
+        vec first[TOGETHER], second[TOGETHER];
+        for (int a = 0; a < TOGETHER; a++) {
+            const int own = o + a < outputs ? o + a : outputs - 1;
+            row[a] = linear + own * inputs;
+            square[a] = quadratic + own * products;
+            first[a] = second[a] = splat(0.0);
+        }
+        for (int i = 0; i < inputs; i++)
+            UNROLL for (int a = 0; a < TOGETHER; a++) first[a] += row[a][i] * x[i];
+        for (int i = 0; i < products; i++)
+            UNROLL for (int a = 0; a < TOGETHER; a++) second[a] += square[a][i] * product[i];
+        for (int a = 0; a < TOGETHER && o + a < outputs; a++) {
+            first_most = larger(magnitude(first[a]) * per_unit[o + a], first_most);
+            second_most = larger(magnitude(second[a]) * per_unit[o + a], second_most);
+            y[o + a] = first[a] + second[a];
+        }
     }
     const mask trusted = (first_most < splat(1.0)) & (second_most < splat(0.2));
     for (int o = 0; o < outputs; o++) y[o] = SELECT(trusted & is_finite(y[o]), y[o], splat(0.0));

@@ -4,9 +4,9 @@
 #ifndef PKMCAL_INVERSE_H
 #define PKMCAL_INVERSE_H
 
-#include "newton.h"
+#include "lone.h"
 
-typedef struct { Reflectors q; vec *twist, *step; } DrivenWork;
+typedef struct { Reflectors q; vec *twist, *step; LoneWork *lone; } DrivenWork;
 
 /* Twists (6) of the limb's actuators, and the answers of its wrenches to them, factorised. */
 static void find_answers(const Machine *m, const Limb *b, LimbWork *w, DrivenWork *d,
@@ -57,10 +57,21 @@ static void limb_step(const Machine *m, const Limb *b, LimbWork *w, DrivenWork *
     for (int k = 0; k < b->passives; k++)
         measure(&size, twist[k], m->per_passive_unit[b->passive + k]);
     mask taken;
-    const vec scale = judge(p, measured(&size), &taken);
+    const vec scale = judge(p, measured(&size), anew ? 2 : 0, &taken);
     for (int k = 0; k < b->passives; k++)
         advance(&at->passive[b->passive + k], twist[k], scale, taken);
     for (int c = 0; c < n; c++) advance(&at->extension[b->own[c]], d->step[c], scale, taken);
+}
+
+/* Iterate until the limb has closed in every pose of the block, or cannot. */
+static void solve_driven(const Machine *m, const Limb *b, LimbWork *w, DrivenWork *d, State *at,
+                         Progress *p) {
+    int anew = 1;
+    for (int k = 0; k < MAX_ITERATIONS && ANY(p->going); k++) {
+        const vec before = p->previous;
+        limb_step(m, b, w, d, at, anew, p);
+        anew = !all_near(p, before);
+    }
 }
 
 /* `at` holds the platform where it is wanted. */
@@ -71,12 +82,8 @@ static Progress solve_limbs(const Machine *m, Work *w, DrivenWork *d, State *at)
     for (int i = 0; i < m->limbs; i++) {
         const Limb *b = &m->limb[i];
         Progress p = begun();
-        int anew = 1;
-        for (int k = 0; k < MAX_ITERATIONS && ANY(p.going); k++) {
-            const vec before = p.previous;
-            limb_step(m, b, &w->limb[i], &d[i], at, anew, &p);
-            anew = !all_near(&p, before);
-        }
+        if (!is_lone(b) || !solve_lone(m, b, &w->limb[i], d[i].lone, at, &p))
+            solve_driven(m, b, &w->limb[i], &d[i], at, &p);
         all.converged &= p.converged;
         all.iterations = larger(p.iterations, all.iterations);
         for (int r = 0; r < b->rows; r++, row++) {

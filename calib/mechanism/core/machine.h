@@ -22,11 +22,17 @@ typedef struct {
     int joint; /* which moving element of its limb it is, or -1 */
 } Element;
 
+/* What moves a joint: `factor` times one of its limb's unknowns, each in its own unit; the passive
+   coordinates come before the actuators. */
+typedef struct { int joint, unknown, first; double factor; } Mover;
+
 typedef struct {
     int element, elements;
     int passive, passives; /* first of its passive coordinates, and how many */
     int wrenches, rows, released;
     int joint, joints;     /* first of its moving elements in `moving`, and how many */
+    int mover, movers;     /* first of what moves them, joint by joint, and how many */
+    unsigned moved;        /* unknowns that move something, a bit each */
     int driven;            /* elements that actuators move */
     int yields;            /* elements that yield */
     int own[6], owns;      /* the actuators that move it (the first six), and how many */
@@ -42,6 +48,7 @@ typedef struct {
     Element *element;
     Term *term;
     int *moving; /* elements that move, limb by limb */
+    Mover *mover;
 } Machine;
 
 #endif

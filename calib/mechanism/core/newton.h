@@ -12,6 +12,8 @@
 #define MAX_STEP 0.4
 #define TOLERANCE 1e-10
 #define STAGNATION 1e-8
+#define FORESEEN 1e-13 /* a step that will leave less is the last */
+#define CURVED 10.0    /* Newton's steps leave their square, times this at least */
 #define NEAR 1e-4     /* after a step this small the next goes by the last linearisation */
 #define SLOWER 0.1    /* unless the step before shrank by less than this */
 
@@ -30,11 +32,21 @@ INLINE Progress begun(void) {
     return p;
 }
 
+/* What a step of this size will leave, where it and the one before were exact to first order (2) or
+   second (3) in what was left; nothing is known of others (0). */
+INLINE vec leaves(const Progress *p, vec size, int order) {
+    const vec shrunk = size / p->previous;
+    if (order == 3) return SELECT(p->previous < splat(INFINITY), size * shrunk * shrunk, size);
+    if (order == 2) return size * larger(CURVED * size, shrunk / p->previous * size);
+    return size;
+}
+
 /* What a step of this size means: which poses take it, and which go on after it. */
-INLINE vec judge(Progress *p, vec size, mask *taken) {
+INLINE vec judge(Progress *p, vec size, int order, mask *taken) {
     const mask fine = is_finite(size);
     const mask closed = (size < splat(TOLERANCE))
-        | ((size < splat(STAGNATION)) & (size > 0.5 * p->previous));
+        | ((size < splat(STAGNATION)) & (size > 0.5 * p->previous))
+        | (leaves(p, size, order) < splat(FORESEEN));
     *taken = p->going & fine;
     p->iterations = SELECT(p->going, p->iterations + 1.0, p->iterations);
     p->converged |= p->going & closed;
@@ -79,7 +91,7 @@ static void step(const Machine *m, Work *w, State *at, const Target *to, int ane
         }
     }
     mask taken;
-    const vec scale = judge(p, measured(&size), &taken);
+    const vec scale = judge(p, measured(&size), anew && !m->redundant ? 2 : 0, &taken);
     vec turn[3];
     for (int i = 0; i < 3; i++) {
         advance(&at->position[i], w->dx[i] * m->size, scale, taken);

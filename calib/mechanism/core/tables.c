@@ -82,9 +82,33 @@ static int read_elements(Machine *m, Limb *b, int *moving, const int *ints, cons
     return 1;
 }
 
+/* What moves the joints of a limb, and which of it is the first to move its unknown. */
+static void find_movers(Machine *m, Limb *b, int first) {
+    b->mover = first;
+    for (int j = 0; j < b->joints; j++) {
+        const Element *e = &m->element[m->moving[b->joint + j]];
+        for (int t = e->term; t < e->term + e->terms; t++) {
+            const Term *term = &m->term[t];
+            int unknown = term->index - b->passive, own = 0;
+            double per_unit = 1.0;
+            if (term->kind == PARAMETER) continue;
+            if (term->kind == PASSIVE) {
+                per_unit = m->per_passive_unit[term->index];
+            } else {
+                while (own < 5 && own < b->owns && b->own[own] != term->index) own++;
+                unknown = b->passives + own;
+                per_unit = m->per_actuator_unit[term->index];
+            }
+            const int anew = !(b->moved >> unknown & 1);
+            m->mover[first + b->movers++] = (Mover){j, unknown, anew, term->factor / per_unit};
+            b->moved |= 1u << unknown;
+        }
+    }
+}
+
 static int read_limbs(Machine *m, const int *ints, const double *reals) {
     const int *at = ints + HEADER + m->tasks;
-    int element = 0, moving = 0;
+    int element = 0, moving = 0, mover = 0;
     for (int i = 0; i < m->limbs; i++, at += LIMB_INTS) {
         Limb *b = &m->limb[i];
         b->element = element;
@@ -100,6 +124,8 @@ static int read_limbs(Machine *m, const int *ints, const double *reals) {
         if (!read_elements(m, b, &moving, ints, reals)) return 0;
         if (b->released && b->rows < b->wrenches && b->driven != b->rows) return 0;
         if (m->independent && (b->owns != b->wrenches || b->rows != b->wrenches)) return 0;
+        find_movers(m, b, mover);
+        mover += b->movers;
         m->rows += b->rows;
         element += b->elements;
     }
@@ -118,14 +144,17 @@ Machine *read_machine(const int *ints, size_t int_count, const double *reals, si
     const size_t limbs = head.limbs * sizeof(Limb), elements = head.elements * sizeof(Element);
     const size_t terms = head.terms * sizeof(Term), own = wanted_reals * sizeof(double);
     const size_t tasks = head.tasks * sizeof(int), moving = head.elements * sizeof(int);
-    char *memory = calloc(1, sizeof(Machine) + own + elements + terms + limbs + tasks + moving + 64);
+    const size_t movers = head.terms * sizeof(Mover);
+    char *memory =
+        calloc(1, sizeof(Machine) + own + elements + terms + movers + limbs + tasks + moving + 64);
     if (!memory) return NULL;
     Machine *m = (Machine *)memory;
     *m = head;
     double *held = (double *)(memory + (sizeof(Machine) + 7) / 8 * 8);
     m->element = (Element *)((char *)held + own);
     m->term = (Term *)((char *)m->element + elements);
-    m->limb = (Limb *)((char *)m->term + terms);
+    m->mover = (Mover *)((char *)m->term + terms);
+    m->limb = (Limb *)((char *)m->mover + movers);
     m->moving = (int *)((char *)m->limb + limbs);
     int *task = m->moving + m->elements;
     memcpy(held, reals, own);
