@@ -60,6 +60,13 @@ def plus_minus(value: float, sigma: float | None, unit: str = "", sign: str = "+
     return f"{digits.text(value)} {sign} {digits.text(sigma)} {unit}".rstrip()
 
 
+def length(mm: float) -> str:
+    """A length to three digits: ``4.57 mm``, ``114 um``."""
+    if abs(mm) >= 0.9995:  # 999.5 um is a millimetre to three digits
+        return f"{mm:.3g} mm" if abs(mm) < 999.5 else f"{mm:.0f} mm"
+    return f"{1000.0 * mm:.3g} um"
+
+
 def rounded(value: float | None, sigma: float | None) -> str:
     """A value alone, to the second digit of its uncertainty."""
     return Digits.of(sigma, value).text(value)

@@ -28,6 +28,9 @@ class Unknown:
         Whether it is searched for, at trial values, before a fit can move it.
     bounds, steps
         Range and number of the trial values, where these are declared beforehand.
+    means : callable, optional
+        What a value of it means, in words, where the number alone says little: one of a few
+        things that it numbers, or a moment on the clock of several runs.
     """
 
     name: str
@@ -37,6 +40,12 @@ class Unknown:
     nonlinear: bool = False
     bounds: tuple[float, float] | None = None
     steps: int = 0
+    means: "Choice | Moment | None" = None
+
+    def in_words(self, value: float) -> dict[str, str]:
+        """Entry ``means`` of a value, where there is more to say than the number."""
+        told = self.means(value) if self.means is not None else ""
+        return {"means": told} if told else {}
 
     @property
     def prior_sigma(self) -> float:
@@ -45,6 +54,32 @@ class Unknown:
         That is enough to keep collinear effects solvable, and too weak to bias anything.
         """
         return self.sigma or VAGUE * self.size
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A number that stands for one of a few things: pairs of number and name."""
+
+    names: tuple[tuple[float, str], ...]
+
+    def __call__(self, value: float) -> str:
+        """Name of the nearest number."""
+        return min(self.names, key=lambda one: abs(one[0] - value))[1]
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A moment on one clock over several runs, which begin at ``starts`` (s)."""
+
+    starts: tuple[float, ...]
+
+    def __call__(self, value: float) -> str:
+        """``run 2 at 120 s``, ``the start of run 2``; nothing where there is but one run."""
+        if len(self.starts) < 2:
+            return ""
+        run = max(k for k, start in enumerate(self.starts) if k == 0 or start <= value + 1e-6)
+        since = value - self.starts[run]
+        return f"run {run + 1} at {since:.0f} s" if since > 0.5 else f"the start of run {run + 1}"
 
 
 @dataclass(frozen=True)

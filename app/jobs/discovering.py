@@ -29,6 +29,7 @@ class SizeEntry(Record):
     value: float
     sigma: float
     unit: str
+    means: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

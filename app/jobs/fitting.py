@@ -60,7 +60,8 @@ class ParameterEntry(Record):
     """A parameter as it was found; mm, rad or what ``unit`` says, ``sigma`` 1 standard deviation.
 
     ``nominal`` is None for the place of the tracker; ``identified``: the readings reduce the
-    tolerance to less than half.
+    tolerance to less than half. ``means``: what a number stands for that is one of a few, or a
+    moment of several runs.
     """
 
     name: str
@@ -69,6 +70,7 @@ class ParameterEntry(Record):
     unit: str
     nominal: float | None
     identified: bool
+    means: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

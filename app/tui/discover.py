@@ -12,6 +12,7 @@ from textual.content import Content
 from textual.widgets import DataTable, Static
 
 from app.show.record_words import remark_lines
+from app.show.sizes import size_text
 from app.tui.choosing import ask_for_model_file, begin_with_model, choose_runs
 from app.tui.dialogs import Pick
 from app.tui.face import Face
@@ -276,8 +277,7 @@ def found_text(view: "View | None") -> Content:
         for each in view.parameters:
             if each["name"].startswith(f"{effect}."):
                 name = each["name"].removeprefix(f"{effect}.")
-                size = plus_minus(each["value"], each["sigma"], each["unit"], sign="±")
-                lines.append(Content(f"  {name:<10} {size}"))
+                lines.append(Content(f"  {name:<10} {size_text(each, sign='±')}"))
     return Content("\n").join(lines)
 
 

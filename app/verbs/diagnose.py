@@ -19,8 +19,8 @@ from app.analysis_options import (
     watcher,
     written_residuals,
 )
+from app.show.sizes import size_text
 from app.show.text_table import text_table
-from calib.digits import plus_minus
 
 
 @click.command()
@@ -115,8 +115,8 @@ def not_asked(report: dict[str, Any]) -> list[str]:
 
 
 def sizes(parameters: list[dict[str, Any]]) -> list[str]:
-    """Values with uncertainties in words."""
-    return [f"{p['name']} = {plus_minus(p['value'], p['sigma'], p['unit'])}" for p in parameters]
+    """Values with uncertainties in words; what a number stands for, where it is one of a few."""
+    return [f"{p['name']} = {size_text(p)}" for p in parameters]
 
 
 def _row(candidate: dict[str, Any]) -> tuple[str, ...]:

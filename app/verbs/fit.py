@@ -131,6 +131,9 @@ def _um(value: float | None) -> str:
 def _row(entry: dict[str, Any]) -> tuple[str, ...]:
     change = None if entry["nominal"] is None else entry["value"] - entry["nominal"]
     digits = Digits.of(entry["sigma"], entry["value"])
+    means = entry.get("means", "")
+    if means and entry["unit"] == "1":
+        return (entry["name"], f"{entry['value']:.0f}", "", "", "", "", means)
     return (
         entry["name"],
         digits.text(entry["value"]),
@@ -140,7 +143,7 @@ def _row(entry: dict[str, Any]) -> tuple[str, ...]:
         if change is None or not entry["sigma"]
         else fixed(change / entry["sigma"], 1, signed=True),
         entry["unit"],
-        "" if entry["identified"] else "not identified",
+        means if entry["identified"] else "not identified",
     )
 
 

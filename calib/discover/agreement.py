@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.chance import chi2_above, chi2_below, f_above, log_chi2_above
+from calib.digits import length
 from calib.errors import BadInput
 from calib.evidence.repeats import pure_error
 from calib.identify.fitting import Fit
@@ -41,8 +42,8 @@ class AtOdds:
 
     def __str__(self) -> str:
         return (
-            f"The runs do not agree: each alone is explained to {1000 * self.apart_mm:.3g} um, "
-            f"together only to {1000 * self.together_mm:.3g} um. They are of two machines, or the "
+            f"The runs do not agree: each alone is explained to {length(self.apart_mm)}, "
+            f"together only to {length(self.together_mm)}. They are of two machines, or the "
             "machine was changed between them: fit them apart"
         )
 

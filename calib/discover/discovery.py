@@ -6,13 +6,14 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from calib.discover.agreement import runs_at_odds
 from calib.discover.diagnosis import RunDiagnosis
 from calib.discover.impossible import forbidden_value
 from calib.discover.noise import judge
 from calib.effects.component import Effect
 from calib.errors import BadInput
 from calib.evidence.findings import Diagnosis
-from calib.evidence.forward import Discovery, Stage, discover
+from calib.evidence.forward import Discovery, Revision, Stage, discover
 from calib.evidence.tails import log_tail
 from calib.identify.fitting import Fit
 from calib.identify.holdout import hold_out
@@ -26,6 +27,9 @@ SEED = 20_260_801
 
 ASTRAY = 1e-3
 """Relative rise of a fit's cost, by one effect more, that is no rounding."""
+
+FAR_APART = 5.0
+"""RMS of several runs together, over that apart, that is another machine before it is an effect."""
 
 BEYOND_DOUBT = -14.0
 """log p from which an effect's own estimate says that it is there, whatever else is in."""
@@ -147,7 +151,22 @@ def discover_run(refit: Refitter, begin: tuple[str, ...] = ()) -> Discovery:
     Those that the record itself shows come first.
     """
     shown = tuple(name for name in refit.rows.known if name not in begin)
+    stage = refit(begin)
+    if not shown and of_other_machines(stage):
+        return Discovery((Revision(stage),), (), (), ())
     return discover(refit, begin, keep=(*begin, *shown), first=shown, forbids=_forbids)
+
+
+def of_other_machines(stage: RunStage) -> bool:
+    """Whether runs are so far from sharing a geometry that effects would only hide it.
+
+    Each alone is explained, together they are worse by far, and no single effect mends half of it.
+    """
+    odds = runs_at_odds(stage.fit)
+    if odds is None or odds.together_mm < FAR_APART * odds.apart_mm:
+        return False
+    best = stage.diagnosis.best
+    return best is None or stage.run.outlook(best).rms_mm > 0.5 * odds.together_mm
 
 
 def _forbids(stage: Stage, name: str) -> bool:

@@ -28,7 +28,9 @@ def noise_words(found: RunDiagnosis) -> str:
     told = [_says(found, one) for one in found.noise.components if one.p_value < CLEAR]
     if not told:
         return ""
-    return f"{'; '.join(told)}. Uncertainties are {found.inflation:.2g} times those of white noise"
+    ratio = f"{found.inflation:.2g} times those"
+    of = "those" if ratio.startswith("1 ") else ratio
+    return f"{'; '.join(told)}. Uncertainties are {of} of white noise"
 
 
 def _entry(found: RunDiagnosis, one: Component) -> dict[str, Any]:

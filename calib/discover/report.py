@@ -119,9 +119,14 @@ def _record(found: RunDiagnosis) -> tuple[Remark, ...]:
 
 
 def _called_for(discovery: Discovery, number: int) -> dict[str, Any]:
-    """p-value, evidence and rivals of an effect when it was added."""
+    """p-value, evidence and rivals of an effect when it was added.
+
+    Empty for one that the record itself shows: it was in the model before any was asked for.
+    """
     added = discovery.steps[number].added
-    return {} if added is None else called_for(stage_of(discovery, number - 1).run, added)
+    if added is None or added in stage_of(discovery, number).fit.model.rows.known:
+        return {}
+    return called_for(stage_of(discovery, number - 1).run, added)
 
 
 def called_for(found: RunDiagnosis, added: str) -> dict[str, Any]:
@@ -198,6 +203,7 @@ def _significant(estimates: Sequence[Estimate], acting: Sequence[str] = ()) -> l
             "value": estimate.value,
             "sigma": estimate.sigma,
             "unit": estimate.unit,
+            **estimate.unknown.in_words(estimate.value),
         }
         for estimate, show in zip(estimates, shown, strict=True)
         if show
@@ -251,8 +257,10 @@ def _of_physics(
         named = "one pose" if poses == 1 else f"{poses} poses"
         excluded += f" With {named} only large effects would show: measure more."
     told = noise_words(found)
-    of_noise = told and all(one.name != "scale" for one in found.noise.components)
-    scatter = "" if of_noise else untrue_uncertainties(found.fit)
+    kinds = {one.name for one in found.noise.components}
+    scatter = "" if told and "scale" not in kinds else untrue_uncertainties(found.fit)
+    if scatter and kinds <= {"scale"}:
+        told = ""  # it is the same in other words
     if told:
         excluded = f" As to noise: {told}.{excluded}"
     hinted = _hinted(found, impossible)

@@ -10,7 +10,7 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray
 from calib.effects.component import Effect, Signature, Situation
-from calib.effects.gravity_sag import under_load, weight_wrench, weightless
+from calib.effects.gravity_sag import WEIGHT_UPWARDS, under_load, weight_wrench, weightless
 from calib.mechanism.rigid import cross
 from calib.runs.stack import Rows
 from calib.unknown import Unknown
@@ -23,7 +23,7 @@ class BaseBending(Effect):
     kind = "machine"
     says = "base or stand give way under the weight: the machine leans and sinks with its load"
     depends = ("run", "payload_kg")
-    wrong_sign = "gravity in [load], or the sign of z, is the wrong way round"
+    wrong_sign = WEIGHT_UPWARDS
     wrong_size = "payload_kg, or a mass in [load], is not in kg (payload in grams?)"
 
     def unavailable(self, rows: Rows) -> str:

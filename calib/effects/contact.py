@@ -14,11 +14,12 @@ from calib.arrays import Array
 from calib.effects.component import Effect, Signature, Situation, alone, per_actuator
 from calib.mechanism.description import Machine
 from calib.runs.stack import Rows
-from calib.unknown import Unknown
+from calib.unknown import Choice, Unknown
 
 INNER = 0.2
 """Part of the readings at either end of an actuator's way between which no contact is tried."""
 TRIALS = 5
+SIDE = Choice(((1.0, "beyond it"), (-1.0, "short of it")))
 
 
 class Contact(Effect):
@@ -38,7 +39,7 @@ class Contact(Effect):
         return (
             *slopes,
             Unknown("contact.at", "1", 0.1, sigma=0.3, nonlinear=True),
-            Unknown("contact.side", "1", 1.0, sigma=1e-6, nonlinear=True),
+            Unknown("contact.side", "1", 1.0, sigma=1e-6, nonlinear=True, means=SIDE),
         )
 
     def parts(self, rows: Rows) -> tuple[tuple[int, ...], ...]:

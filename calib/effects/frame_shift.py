@@ -11,12 +11,13 @@ import numpy as np
 
 from calib.arrays import Array
 from calib.effects.component import Effect, Scan, Signature, Situation
-from calib.effects.run_clock import about, between, from_then_on, run_starts, spread
+from calib.effects.run_clock import about, between, from_then_on, moment_of, run_starts, spread
 from calib.effects.tracker import rigid_motions
 from calib.mechanism.rigid import cross, rotate
 from calib.runs.stack import Rows
-from calib.unknown import Unknown
+from calib.unknown import Choice, Unknown
 
+WHERE = Choice(((0.0, "the nests on the platform"), (1.0, "the base")))
 EDGE = 0.06
 """Part of the readings at either end in which a step cannot be told from bad readings."""
 
@@ -40,8 +41,8 @@ class FrameShift(Effect):
         return (
             *(Unknown(f"frame-shift.{axis}", "mm", 0.05) for axis in ("x", "y", "z")),
             *(Unknown(f"frame-shift.{axis}", "rad", 1e-4) for axis in ("rx", "ry", "rz")),
-            Unknown("frame-shift.t0", "s", gap, sigma=gap, nonlinear=True),
-            Unknown("frame-shift.where", "1", 1.0, sigma=1e-6, nonlinear=True),
+            Unknown("frame-shift.t0", "s", gap, sigma=gap, nonlinear=True, means=moment_of(rows)),
+            Unknown("frame-shift.where", "1", 1.0, sigma=1e-6, nonlinear=True, means=WHERE),
         )
 
     def trials(self, rows: Rows) -> Iterator[tuple[float, ...]]:

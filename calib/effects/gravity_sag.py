@@ -22,6 +22,12 @@ from calib.mechanism.rigid import cross, rotate
 from calib.runs.stack import Rows
 from calib.unknown import Unknown
 
+WEIGHT_UPWARDS = (
+    "gravity in [load], the sign of z, or payload_kg (rows with and without it exchanged) is the "
+    "wrong way round"
+)
+"""What makes a compliance negative."""
+
 
 def actuator_forces(situation: Situation) -> Array:
     """Force (N) or torque (N mm) that the weight puts into each actuator, shape (n, N)."""
@@ -90,7 +96,7 @@ class GravitySag(Effect):
     kind = "machine"
     says = "legs, rods or drives give way under the weight of platform and payload"
     depends = ("run", "payload_kg")
-    wrong_sign = "gravity in [load], or the sign of z, is the wrong way round"
+    wrong_sign = WEIGHT_UPWARDS
     wrong_size = "payload_kg, or a mass in [load], is not in kg (payload in grams?)"
 
     def lacking(self, machine: Machine) -> str:

@@ -4,7 +4,7 @@ One c for all is the case of equal legs, ``gravity-sag``: what tells the two apa
 differ.
 """
 
-from calib.effects.gravity_sag import spring_compliance
+from calib.effects.gravity_sag import WEIGHT_UPWARDS, spring_compliance
 from calib.effects.under_force import PerForce
 from calib.mechanism.description import Machine
 
@@ -15,7 +15,7 @@ class LegCompliance(PerForce):
     id = "leg-compliance"
     says = "legs or drives give way under the weight, each by a compliance of its own"
     depends = ("run", "payload_kg")
-    wrong_sign = "gravity in [load], or the sign of z, is the wrong way round"
+    wrong_sign = WEIGHT_UPWARDS
     wrong_size = "payload_kg, or a mass in [load], is not in kg (payload in grams?)"
 
     def lacking(self, machine: Machine) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 
 from calib.arrays import Array
 from calib.effects.component import Effect
-from calib.effects.run_clock import about, spread
+from calib.effects.run_clock import about, moment_of, spread
 from calib.runs.stack import Rows
 from calib.unknown import Unknown
 
@@ -25,7 +25,8 @@ class OneStep(Effect):
         """The moment, known to half of what lies between two of them."""
         moments = self.moments(rows)
         gap = float(np.median(np.diff(moments))) if moments.size > 1 else 1.0
-        return Unknown(f"{self.id}.t0", "s", gap, sigma=0.5 * gap, nonlinear=True)
+        name, means = f"{self.id}.t0", moment_of(rows)
+        return Unknown(name, "s", gap, sigma=0.5 * gap, nonlinear=True, means=means)
 
     def trials(self, rows: Rows) -> Iterator[tuple[float, ...]]:
         """Moments over all runs."""

@@ -15,7 +15,7 @@ from calib.mechanism.rigid import Poses, small_rotation
 from calib.mechanism.solve import begun_at, forward
 from calib.mechanism.variants import closure_names, with_closure
 from calib.runs.stack import Rows
-from calib.unknown import Unknown
+from calib.unknown import Choice, Unknown
 
 
 class Redundancy(Effect):
@@ -33,9 +33,10 @@ class Redundancy(Effect):
 
     def unknowns(self, rows: Rows) -> tuple[Unknown, ...]:
         """``redundancy.share`` and, searched, ``redundancy.limb``."""
+        limbs = Choice(tuple((float(k), one.name) for k, one in enumerate(rows.machine.limbs, 1)))
         return (
             Unknown("redundancy.share", "1", 1.0),
-            Unknown("redundancy.limb", "1", 1.0, sigma=1e-6, nonlinear=True),
+            Unknown("redundancy.limb", "1", 1.0, sigma=1e-6, nonlinear=True, means=limbs),
         )
 
     def trials(self, rows: Rows) -> Iterator[tuple[float, ...]]:

@@ -4,6 +4,7 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray
 from calib.runs.stack import Rows
+from calib.unknown import Moment
 
 MOMENTS = 40
 """Most moments that are tried."""
@@ -14,6 +15,11 @@ def run_starts(rows: Rows) -> Array:
     runs = range(len(rows.runs))
     spans = np.array([np.max(rows.time_s[rows.run == k], initial=0.0) + 1.0 for k in runs])
     return np.asarray(np.cumsum(spans) - spans)
+
+
+def moment_of(rows: Rows) -> Moment:
+    """What a moment on that clock means."""
+    return Moment(tuple(run_starts(rows).tolist()))
 
 
 def from_then_on(rows: Rows, times: Array, moment: float) -> BoolArray:

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from calib.arrays import Array, BoolArray, parts_of
+from calib.digits import length
 from calib.evidence.problem import LinearProblem
 from calib.identify.optimum import optimise
 from calib.identify.readings import MASKED, BadReading, strays
@@ -288,7 +289,7 @@ def miss_in_words(linear: Linearised, row: int) -> str:
     miss = float(np.linalg.norm(linear.residual[:, row]))
     if rows.sensed is not None and rows.sensed.angular[row]:
         return f"{1e6 * miss:.3g} urad from what it should read"
-    return f"{1000 * miss:.3g} um from where it should be"
+    return f"{length(miss)} from where it should be"
 
 
 def _with_frames(start: State, begun: State) -> State:

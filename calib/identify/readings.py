@@ -13,6 +13,7 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray, IntArray, parts_of
 from calib.chance import f_rarer_than
+from calib.digits import length
 from calib.runs.stack import Rows
 from calib.scaled import Scaled
 
@@ -52,11 +53,7 @@ def wrong_place(rows: Rows, row: int, expected: dict[str, Array], slack: float) 
     nearest = min(apart, key=lambda name: apart[name])
     if nearest != label and apart[nearest] < slack:
         return f"reads as nest {nearest}, was labelled {label}"
-    return f"{_mm(apart[label])} from where nest {label} is, and in no other nest"
-
-
-def _mm(distance: float) -> str:
-    return f"{distance:.3g} mm" if distance >= 1.0 else f"{1000 * distance:.3g} um"
+    return f"{length(apart[label])} from where nest {label} is, and in no other nest"
 
 
 def strays(

@@ -81,6 +81,7 @@ def parameter_table(fit: Fit) -> list[dict[str, Any]]:
     units += [unknown.unit for group in model.unknowns for unknown in group]
     units += [unknown.unit for unknown in model.setup.unknowns]
     units += ["mm", "mm", "mm", "rad", "rad", "rad"] * model.frames
+    unknowns = {one.name: one for group in model.unknowns for one in group}
     nominal: list[float | None] = [float(v) for v in model.centre]
     nominal[len(nominal) - 6 * model.frames :] = [None] * (6 * model.frames)
     return [
@@ -91,6 +92,7 @@ def parameter_table(fit: Fit) -> list[dict[str, Any]]:
             "unit": unit,
             "nominal": at,
             "identified": bool(known),
+            **(unknowns[name].in_words(float(value)) if name in unknowns else {}),
         }
         for name, value, sigma, unit, at, known in zip(
             model.names, fit.values, fit.sigmas, units, nominal, identified, strict=True

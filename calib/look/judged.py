@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Sequence
 import numpy as np
 
 from calib.arrays import IntArray
-from calib.digits import plus_minus
+from calib.digits import length, plus_minus
 from calib.effects.component import Effect
 from calib.identify.fitting import Fit
 from calib.identify.readings import MASKED, BadReading
@@ -55,19 +55,21 @@ def _or_unexplained(fitted: Fit, *found: Remark) -> tuple[Remark, ...]:
     scatter = fitted.chi2_per_dof
     if not scatter > NOBODY or not settled(found):
         return found
+    several = len(fitted.model.rows.runs) > 1
+    alone = "Fit each run alone: if each is explained, they are of several machines. " * several
     apart = float(np.sqrt(np.mean(np.sum(fitted.linear.residual[:, fitted.accepted] ** 2, axis=0))))
     return (
         *found,
         Remark(
             "misfit-unexplained",
-            f"The readings are off by {apart:.3g} mm (RMS), {np.sqrt(scatter):.0f} times what is "
+            f"The readings are off by {length(apart)} (RMS), {np.sqrt(scatter):.0f} times what is "
             "stated of them: the record, or the machine, is not what the files say",
             (),
             "No single mistake of those that are tried explains it, and no machine within its "
             "tolerances",
             "Fitted as it stands; it is not called adequate",
-            "See the nest tables, q, whether anything was moved, and sx, sy, sz; then ask discover "
-            "what the residual depends on",
+            alone + "See the nest tables, q, whether anything was moved, and sx, sy, sz; then ask "
+            "discover what the residual depends on",
             False,
             fitted.model.rows.runs[0].source,
         ),
@@ -148,14 +150,25 @@ def _geometry(fitted: Fit) -> Iterator[Remark]:
         for k in worst[:3]
     )
     more = f" and {far.size - 3} more" if far.size > 3 else ""
+    remedy = (
+        "Check the frame and the units of [nests.platform] and [nests.base], the controller's "
+        "parameters, and the machine"
+    )
+    if far.size == 1:  # a table that is off bends many
+        k = int(worst[0])
+        unit = model.machine.parameters[model.free[k]].unit
+        remedy = (
+            f"Check {model.names[k]} in the machine file first: it says {model.centre[k]:.7g} "
+            f"{unit}, the readings {fitted.values[k]:.7g} {unit}; then the controller, "
+            "and the machine"
+        )
     yield Remark(
         "geometry-impossible",
         f"No machine within its tolerances is like this: {told}{more}",
         (),
         f"That is {np.abs(off[worst[0]]):.0f} times the standard deviation of its tolerance",
         "Fitted as it stands; it is not called adequate",
-        "Check the frame and the units of [nests.platform] and [nests.base], the controller's "
-        "parameters, and the machine",
+        remedy,
         False,
         model.rows.runs[0].source,
     )

@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from calib.arrays import Array, BoolArray, IntArray
+from calib.digits import length
 from calib.identify.alignment import collinear, robust_align
 from calib.look.places import Frame, Places
 from calib.look.proposal import Proposal
@@ -128,7 +129,7 @@ def _remark(places: Places, steps: list[Step], *, parted: bool) -> Remark:
     run, rows = places.run, places.rows
     sizes = [_size(places, step) for step in steps]
     told = " and ".join(
-        f"by {_mm(size)} before line {rows.line[step.at]} ({rows.time_s[step.at]:.0f} s)"
+        f"by {length(size)} before line {rows.line[step.at]} ({rows.time_s[step.at]:.0f} s)"
         for step, size in zip(steps, sizes, strict=True)
     )
     after = rows.line[min(step.at for step in steps) :]
@@ -161,7 +162,3 @@ def _size(places: Places, step: Step) -> float:
     middle = places.base.mean(axis=1)
     (first, start), (second, end) = step.before, step.after
     return float(np.linalg.norm(second @ middle + end - first @ middle - start))
-
-
-def _mm(distance: float) -> str:
-    return f"{distance:.3g} mm" if distance >= 1.0 else f"{1000 * distance:.3g} um"

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.arrays import Array
+from calib.digits import length
 from calib.effects.tracker import rigid_motions
 from calib.identify.fitting import Fit
 from calib.look.gravity import weight_fall
@@ -85,7 +86,6 @@ def step_remark(fitted: Fit, found: FrameStep) -> Remark:
     middle = fitted.linear.situation.base_point.mean(axis=1)[:, None]
     moved = np.tensordot(found.values[:6], rigid_motions(middle), axes=1)
     size = float(np.linalg.norm(moved))
-    told = f"{size:.3g} mm" if size >= 1.0 else f"{1000 * size:.0f} um"
     moved_by = (
         "The tracker, the base or all nests on the platform were moved"
         if found.or_tool
@@ -93,7 +93,7 @@ def step_remark(fitted: Fit, found: FrameStep) -> Remark:
     )
     return Remark(
         "station-moved",
-        f"{moved_by} during the run: by {told} before line "
+        f"{moved_by} during the run: by {length(size)} before line "
         f"{rows.line[found.row]} ({rows.time_s[found.row]:.0f} s)",
         ranges(rows.line[found.row :], rows.line),
         f"One step of the frame explains "

@@ -135,7 +135,14 @@ def _each_pose(fitted: Fit, out: IntArray) -> Iterator[Group]:
         k = int(np.argmax(explained))
         axis = rows.machine.actuators[k]
         lines = ranges(rows.line[gone], rows.line)
-        if explained[k] > ONE_ACTUATOR:
+        twin = _same_command(fitted, gone)
+        if twin:
+            says = f"q1.. of pose {name} are those of pose {twin} to the last digit: copied"
+            evidence = (
+                f"The readings of {twin} stand in their nests, {gone.size} of {own.size} of {name} "
+                "do not"
+            )
+        elif explained[k] > ONE_ACTUATOR:
             off = score[k] / weight[k]
             says = (
                 f"At pose {name} {axis.name} stood about {off:+.3g} {axis.unit} from what q{k + 1} "
@@ -161,6 +168,15 @@ def _each_pose(fitted: Fit, out: IntArray) -> Iterator[Group]:
                 f"Check q1.. in {lines_in_words(lines)}",
             ),
         )
+
+
+def _same_command(fitted: Fit, gone: IntArray) -> str:
+    """Another pose with the very q of these readings, whose own are good; empty if none."""
+    rows = fitted.model.rows
+    same = np.all(rows.q == rows.q[:, gone[:1]], axis=0) & rows.on_platform & fitted.accepted
+    same &= rows.run == rows.run[gone[0]]
+    others = [rows.pose_name[row] for row in np.flatnonzero(same)]
+    return next((one for one in others if one and one != rows.pose_name[gone[0]]), "")
 
 
 def _displacements(fitted: Fit, rows: IntArray) -> Array:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from app.files.machines import load_machine
-from calib.discover.discovery import Refitter
+from calib.discover.discovery import Refitter, discover_run, stage_of
 from calib.discover.follow_up import FollowUp
+from calib.discover.report import advice
 from calib.effects import effect_named
 from calib.effects.run_clock import run_starts
 from calib.poses.reach import sample_poses
@@ -92,3 +93,16 @@ def test_an_actuator_that_is_elsewhere_in_the_second_run_is_off_from_its_start()
     found = dict(zip(fitted.model.names, fitted.values.tolist(), strict=True))
     assert found["actuator-step.leg4"] == pytest.approx(0.1, abs=0.02)
     assert abs(found["actuator-step.t0"] - run_starts(rows)[1]) < 1e-6
+
+
+@pytest.mark.long
+def test_runs_of_two_machines_are_said_to_be_so_before_any_effect() -> None:
+    machine = load_machine("hexapod")
+    plan = replace(PLAN, poses=10, nests=("3", "4"))
+    made = [simulate(replace(plan, seed=seed)) for seed in (21, 22)]
+    texts = [(run_toml(one), points_csv(one)) for one in made]
+    rows = stack(machine, [parse_run(*text, actuators=6) for text in texts])
+    refit = Refitter(rows, [effect_named(name, machine) for name in ("backlash", "screw-pitch")])
+    found = discover_run(refit)
+    assert len(found.steps) == 1
+    assert "two machines" in advice(stage_of(found).run)
