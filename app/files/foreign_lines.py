@@ -109,13 +109,17 @@ def _begin(lines: Sequence[str], layout: Layout, source: str) -> int:
 def split(
     kept: Sequence[tuple[int, str]], layout: Layout, source: str
 ) -> list[tuple[int, list[str]]]:
-    """Cells of lines that are not empty; raises BadInput for quotation marks left open."""
+    """Cells of lines that are not empty; raises BadInput for quotation marks left open.
+
+    A quotation mark may stand behind a blank (``"A", "B"``).
+    """
     if layout.delimiter == "blanks":
         return [(number, _blanks(line)) for number, line in kept]
     numbers = [number for number, _ in kept]
     reader = csv.reader(
-        (line + "\n" for _, line in kept), delimiter=DELIMITERS[layout.delimiter], strict=True
-    )
+        (line + "\n" for _, line in kept), delimiter=DELIMITERS[layout.delimiter], strict=True,
+        skipinitialspace=layout.delimiter != "tab",
+    )  # fmt: skip
     rows: list[tuple[int, list[str]]] = []
     try:
         rows.extend((numbers[reader.line_num - 1], cells) for cells in reader)

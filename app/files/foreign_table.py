@@ -5,6 +5,7 @@ none of the table's. What does not fit is named with line and column.
 """
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +18,8 @@ from calib.units import split_header
 
 Column = str | int
 """A column by its name, or by its number from 1 on."""
+AT_THE_END = 12
+"""Lines at the end of a file that may be no rows but what a program says of all of them."""
 
 
 @dataclass(frozen=True)
@@ -89,10 +92,12 @@ class ForeignTable:
             return math.nan
         value = parse_number(cell, self.layout)
         if value is None:
+            late = row >= max(1, len(self.rows) - AT_THE_END)
             raise BadInput(
                 f"found {cell!r}",
                 place=self.place(row, at),
-                remedy=number_remedy(cell, self.layout),
+                remedy=number_remedy(cell, self.layout)
+                + (_ends_before(self.rows[row]) if late else ""),
             )
         return value
 
@@ -114,15 +119,29 @@ def table_of(text: str, layout: Layout, source: str) -> ForeignTable:
     return _with_header(split(kept, layout, source), layout, source, notes)
 
 
+def ends_with(cells: Sequence[str]) -> str:
+    """A pattern of lines that begin as this one does; empty where it begins with no word."""
+    word = next((cell.strip() for cell in cells if cell.strip()), "")
+    begin = re.match(r"[^\W\d_][^\s:;,=|]*", word)
+    return "" if begin is None else rf"^\W*{re.escape(begin[0])}"
+
+
+def _ends_before(cells: Sequence[str]) -> str:
+    """What to write where the table ends before such a line; empty where it begins no text."""
+    end = ends_with(cells)
+    return f"; if the table ends before it, write end = '{end}' under [file]" if end else ""
+
+
 def _with_header(
     rows: list[tuple[int, list[str]]], layout: Layout, source: str, notes: list[str]
 ) -> ForeignTable:
     header_line, names, units = 0, [], []
+    said: list[str] = []
     if layout.header:
         if not rows:
             raise BadInput("there is no line of names", place=source, remedy="See skip and after")
-        (header_line, cells), *rows = rows
-        names, units = map(list, zip(*(split_header(cell) for cell in cells), strict=True))
+        (header_line, said), *rows = rows
+        names, units = map(list, zip(*(split_header(cell) for cell in said), strict=True))
     if layout.units_row and rows:
         (_, stated), *rows = rows
         stated = [cell.strip().strip("[]()").strip() for cell in stated]
@@ -145,9 +164,16 @@ def _with_header(
         width, dropped = _without_empty(rows, names, width)
     notes += [f"{dropped} columns at the end are empty and left out"] * bool(dropped)
     names, units = names[:width], units[:width]
-    for line, cells in rows:
+    for number, (line, cells) in enumerate(rows):
+        if said and cells == said[: len(cells)] and any(cell.strip() for cell in cells):
+            raise BadInput(
+                f"the names of line {header_line} come again",
+                place=f"{source}, line {line}",
+                remedy="These are two tables: give each a file of its own, or delete this line",
+            )
         if len(cells) != width:
-            raise _wrong_width(line, cells, width, layout, source)
+            late = number >= max(1, len(rows) - AT_THE_END)
+            raise _wrong_width(line, cells, width, layout, source, _ends_before(cells) * late)
     return ForeignTable(
         source,
         layout,
@@ -187,7 +213,7 @@ def _other_delimiter(line: str) -> str:
 
 
 def _wrong_width(
-    line: int, cells: Sequence[str], width: int, layout: Layout, source: str
+    line: int, cells: Sequence[str], width: int, layout: Layout, source: str, end: str
 ) -> BadInput:
     remedy = f"Expected {width}, as in the {'header' if layout.header else 'first row'}"
     if layout.fields:
@@ -196,4 +222,5 @@ def _wrong_width(
         remedy += f'; between columns may stand "{other}"'
     if len(cells) == 2 * width - 1 or (layout.delimiter == "," and len(cells) > width):
         remedy += "; decimals behind a comma need another delimiter or quotation marks"
+    remedy += end
     return BadInput(f"{len(cells)} fields found", place=f"{source}, line {line}", remedy=remedy)

@@ -2,18 +2,21 @@
 
 import re
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from app.files.foreign_layout import DELIMITERS, Layout
 from app.files.foreign_numbers import parse_number
-from app.files.foreign_table import ForeignTable, table_of
+from app.files.foreign_table import AT_THE_END, ForeignTable, ends_with, table_of
 from calib.errors import BadInput
 from calib.plain_text import plain
 from calib.units import UNITS, known_as
 
 _COMMENTS = ("//", "#", "!", "%")
 _MOST_LINES = 400
+USUAL = 0.6
+"""Part of the rows that hold a number in a column of numbers."""
 
 
 def guessed_table(path: Path) -> tuple[ForeignTable, list[str]]:
@@ -43,6 +46,7 @@ def guessed_table(path: Path) -> tuple[ForeignTable, list[str]]:
     layout = replace(layout, units_row=_has_units(text.split("\n"), layout))
     if layout.units_row:
         layout = replace(layout, header=True, skip=max(0, first - 2))
+    layout = replace(layout, end=_end(text.split("\n")[first:], layout))
     said = [f"[file] {key}" for key in ("encoding", "delimiter", "decimal", "comments", "skip")]
     return table_of(text, layout, str(path)), said
 
@@ -77,7 +81,15 @@ def _delimiter(lines: list[str]) -> str:
         width, count = max(widths.items(), key=lambda pair: (pair[1], pair[0]))
         if width > 1 and count > score * 1.05:
             best, score = name, float(count)
+    if best == "," and _most_numbers(lines, "blanks", ",") > _most_numbers(lines, ",", "."):
+        return "blanks"  # these commas stand before decimals
     return best
+
+
+def _most_numbers(lines: list[str], delimiter: str, decimal: str) -> int:
+    """How many cells of lines so read are numbers."""
+    layout = Layout(delimiter=delimiter, decimal=decimal)
+    return sum(_numbers(line, layout) for line in lines)
 
 
 def _cells(line: str, layout: Layout) -> list[str]:
@@ -122,9 +134,42 @@ def _first_row(lines: list[str], layout: Layout) -> int:
     return 0
 
 
+def _end(lines: Sequence[str], layout: Layout) -> str:
+    """A pattern of the first line behind the rows, which says something of all; "" for none.
+
+    A row has as many cells as most, and numbers where nearly all rows have them.
+    """
+    rows = [
+        _cells(line, layout) for line in lines
+        if line.strip() and not line.lstrip().startswith(layout.comments or ("\x00",))
+    ]  # fmt: skip
+    width = Counter(map(len, rows)).most_common(1)[0][0] if rows else 0
+    whole = [cells for cells in rows if len(cells) == width]
+    numeric = [
+        sum(parse_number(cells[at], layout) is not None for cells in whole) > USUAL * len(whole)
+        for at in range(width)
+    ]
+    behind = 0
+    while behind < min(AT_THE_END, len(rows) - 1):
+        cells = rows[-1 - behind]
+        texts = (
+            cell and parse_number(cell, layout) is None
+            for cell, number in zip(cells, numeric, strict=False)
+            if number
+        )
+        if len(cells) == width and not any(texts):
+            break
+        behind += 1
+    if not behind:
+        return ""
+    end = ends_with(rows[-behind])
+    earlier = (layout.delimiter.join(cells) for cells in rows[:-behind])
+    return "" if not end or any(re.search(end, line) for line in earlier) else end
+
+
 def _has_names(line: str, layout: Layout) -> bool:
-    cells = _cells(line, layout)
-    return bool(line.strip()) and len(cells) > 1 and _numbers(line, layout) == 0
+    cells, remark = _cells(line, layout), line.lstrip().startswith(layout.comments or ("\x00",))
+    return bool(line.strip()) and not remark and len(cells) > 1 and _numbers(line, layout) == 0
 
 
 def _has_units(lines: list[str], layout: Layout) -> bool:

@@ -160,3 +160,25 @@ def test_a_pattern_that_takes_for_ever_on_some_label_is_ended_there() -> None:
     with pytest.raises(BadInput, match="5000 signs"):
         patterns.find(pattern, "x" * 5000, "f.csv, line 3")
     assert patterns.find(pattern, "xyz!", "f.csv, line 3")
+
+
+TRAILING = {
+    "a,b\n1,2\n3,4\nMean,3\n": (r"found 'Mean'.*end = '\^\\W\*Mean'", ","),
+    "a;b\n1;2\n3;4\nTotal: 2\n": (r"1 fields found.*end = '\^\\W\*Total'", ";"),
+    "a,b\n1,2\na,b\n3,4\n": (r"line 3: the names of line 1 come again.*delete this line", ","),
+}
+
+
+@pytest.mark.parametrize("text", TRAILING)
+def test_lines_behind_the_rows_are_refused_with_what_ends_the_table(text: str) -> None:
+    says, delimiter = TRAILING[text]
+
+    def first_column(layout: Layout) -> list[float]:
+        table = table_of(text, layout, "a.csv")
+        return [table.number(row, 0) for row in range(len(table.rows))]
+
+    with pytest.raises(BadInput, match=says):
+        first_column(Layout(delimiter=delimiter))
+    if "come again" not in says:
+        ended = Layout(delimiter=delimiter, end=r"^\W*(Mean|Total)")
+        assert first_column(ended) == [1.0, 3.0]
