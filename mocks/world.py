@@ -13,7 +13,7 @@ from calib.mechanism.description import Machine
 from mocks.clock import Clock, ScaledClock
 from mocks.faults import FaultSet
 from mocks.hidden.table import Hidden
-from mocks.physics.actuators import Load, play_widths
+from mocks.physics.actuators import Load, play_widths, true_load
 from mocks.physics.bodies import body_named, body_of
 from mocks.physics.body import Body, Surroundings
 from mocks.physics.circumstances import Circumstances, Stroke
@@ -69,8 +69,9 @@ class World:
         self.parameters: dict[str, float] = (
             dict(given) if given is not None else draw_parameters(self.machine, plan.seed)
         )
-        self._real = self.body.real(self.parameters, plan.hidden, self.load, True)
-        self._stand = Stand(plan.hidden, self.body, self.load)
+        carried = true_load(self.load, plan.hidden, self.body.limbs, self.body.stroke)
+        self._real = self.body.real(self.parameters, plan.hidden, carried, True)
+        self._stand = Stand(plan.hidden, self.body, carried)
         self.faults = FaultSet()
         self.climate = Climate(plan.seed)
         self.station = Station(plan.seed, self.around.place)

@@ -61,9 +61,18 @@ class RunStage:
 
     @property
     def doubtful(self) -> frozenset[str]:
-        """Effects whose estimates are not far from nothing for their uncertainty (Wald's test)."""
+        """Effects whose estimates are not far from nothing for their uncertainty (Wald's test).
+
+        One beside which alone another has been asked is in no doubt while that is there.
+        """
         fit = self.run.fit
         model = fit.model
+        needed = {
+            name
+            for other in model.effects
+            for name in set(other.beside) & set(self.effects)
+            if len(set(other.beside) & set(self.effects)) == 1
+        }
         first, found = model.free.size, []
         for effect, group in zip(model.effects, model.unknowns, strict=True):
             which = first + np.flatnonzero(linear_among(group))
@@ -73,7 +82,7 @@ class RunStage:
             alike = fit.covariance[np.ix_(which, which)] / sigma / sigma[:, None]
             chi2 = np.array([distance @ np.linalg.solve(alike, distance)])
             chi2 /= max(1.0, fit.chi2_per_dof)
-            if log_tail(chi2, which.size)[0] > BEYOND_DOUBT:
+            if log_tail(chi2, which.size)[0] > BEYOND_DOUBT and effect.id not in needed:
                 found.append(effect.id)
         return frozenset(found)
 

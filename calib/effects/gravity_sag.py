@@ -138,7 +138,8 @@ class GravitySag(Effect):
         """Actuator forces; or what the platform gives way for springs of 1 mm/N."""
         spring = spring_compliance(situation.machine)
         if spring:
-            return Signature(twist=_given_way(situation)[None] / spring)
+            wrench = weight_wrench(situation.rows, situation.rotation)
+            return Signature(twist=given_way(situation, *wrench)[None] / spring)
         forces, units = actuator_forces(situation), units_of(situation.machine.axes)
         shape = np.zeros((len(units), *forces.shape))
         for number, own in enumerate(units.values()):
@@ -146,10 +147,12 @@ class GravitySag(Effect):
         return Signature(extension=shape)
 
 
-def _given_way(situation: Situation) -> Array:
-    """Twist (6, N) of the platform under the weight, by the closure's own compliance."""
+def given_way(situation: Situation, force: Array, moment: Array) -> Array:
+    """Twist (6, N) of the platform by the closure's own compliance, base axes.
+
+    ``force`` (3, N) in N, ``moment`` (3, N) in N mm about the platform's origin.
+    """
     size = situation.machine.size
-    force, moment = weight_wrench(situation.rows, situation.rotation)
     wrench = np.concatenate([force * size, moment])
     compliance = _platform_compliance(situation)[:, :, situation.state_of]
     twist = np.einsum("ijn,jn->in", compliance, wrench)

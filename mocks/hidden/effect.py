@@ -80,6 +80,8 @@ class Physics:
     stand
         Motion (N, 6) of the machine against the base frame, mm and rad (small), under the weight:
         force (N, 3) in N and moment (N, 3) in N mm about the base origin.
+    payload_off
+        Where the payload's centre of mass is, less where the load has it, (3,) mm, platform frame.
     base
         Displacement (N, 3) of points (N, 3) of the base frame at times (N,).
     seen
@@ -92,6 +94,7 @@ class Physics:
     friction: Callable[[Circumstances], Array] | None = None
     nest: Callable[[Nest, Array, Array], Array] | None = None
     stand: Callable[[Array, Array], Array] | None = None
+    payload_off: Array | None = None
     base: Callable[[Array, Array], Array] | None = None
     seen: Callable[[Array, Array, float | None], Array] | None = None
 

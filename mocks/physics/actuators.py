@@ -40,6 +40,15 @@ class Load:
         return np.concatenate([weight, np.cross(turned, gravity)], axis=1)
 
 
+def true_load(load: Load, hidden: Hidden, limbs: tuple[str, ...], stroke: Stroke) -> Load:
+    """What is really carried where something hidden has moved it."""
+    every = [physics.payload_off for physics in hidden.physics(limbs, stroke)]
+    x, y, z = np.asarray(load.payload_com) + sum(
+        (off for off in every if off is not None), np.zeros(3)
+    )
+    return replace(load, payload_com=(float(x), float(y), float(z)))
+
+
 def play_widths(hidden: Hidden, limbs: tuple[str, ...], stroke: Stroke) -> Array:
     """Full widths (n, K) of the play elements that the hidden effects need, one after the other."""
     return np.concatenate([np.zeros((len(limbs), 0)), *_widths(hidden, limbs, stroke)], axis=1)

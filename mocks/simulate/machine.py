@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from calib.mechanism.description import Machine
-from mocks.physics.actuators import Load, play_widths
+from mocks.physics.actuators import Load, play_widths, true_load
 from mocks.physics.body import Body
 from mocks.physics.circumstances import Circumstances
 from mocks.physics.play import follow
@@ -65,10 +65,11 @@ def true_poses(
 ) -> Pose:
     """Where the platform really is at every row.
 
-    ``extension`` (R, n) as commanded; ``time`` (R,) s; ``channels`` (R,):
+    ``load`` as it is stated; ``extension`` (R, n) as commanded; ``time`` (R,) s; ``channels`` (R,):
     ``structure_temp_C``, ``air_temp_C``, ``payload_kg``, ``delay_s``.
     """
     widths = play_widths(plan.hidden, body.limbs, body.stroke)
+    load = true_load(load, plan.hidden, body.limbs, body.stroke)
     circumstances = Circumstances(
         extension=extension,
         play=follow(extension, widths),
