@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from app.files.noises import SavedNoise, read_noise
 from app.files.staircase import Way, read_way
 from app.files.text import read_text
 from calib.arrays import Array
@@ -64,6 +65,8 @@ class SavedFit:
     """Points files of the runs."""
     way: Way = field(default_factory=Way)
     """How it was found, where that was kept."""
+    noise: SavedNoise | None = None
+    """With what noise it counted; None where the readings were taken as they state."""
 
     def covariance_of(self, names: list[str]) -> Array:
         """Covariance of some parameters, in that order."""
@@ -115,6 +118,7 @@ def fit_of(top: TomlTable, source: str) -> SavedFit:
         region=_region(top.table("measured")) if top.has("measured") else None,
         runs=tuple(top.texts("runs")),
         way=read_way(top),
+        noise=read_noise(top),
     )
 
 

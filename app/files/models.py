@@ -14,6 +14,7 @@ import tomli_w
 from app.files.controller_frames import frames_apart
 from app.files.fits import MODEL_FORMAT, read_fit, region_table
 from app.files.machines import shipped_machines
+from app.files.noises import noise_tables
 from app.files.staircase import Way, way_tables
 from app.files.text import read_text
 from app.surely import write_surely
@@ -108,6 +109,7 @@ def write_model(path: Path, fit: Fit, way: Way = Way()) -> None:  # noqa: B008 -
         "controller": dict(last.controller_parameters),
         **({} if last.load is None else {"load": _load_table(last.load)}),
         "measured": region_table(Region.of_fit(fit)),
+        **noise_tables(fit),
         "correlations": {
             name: [round(float(value), 6) for value in row[: index + 1]]
             for index, (name, row) in enumerate(zip(fit.model.names, correlation, strict=True))

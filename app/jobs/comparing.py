@@ -12,11 +12,15 @@ from app.files.residuals import residuals_of_fit
 from app.files.runs import outside_runs
 from app.jobs.chosen_runs import File, Runs, names_of, path_of
 from app.jobs.fitting import BadReadingEntry, RemarkEntry
+from app.jobs.noise_entries import NoiseEntry
 from app.jobs.record import Record, Report
+from app.noisy import with_noise_of
 from calib.discover.compare import RunComparison, compare_fit
 from calib.discover.compare_report import compare_report
 from calib.discover.discovery import SEED
+from calib.discover.noise_report import noise_report
 from calib.discover.terms import propose as propose_terms
+from calib.identify import Fit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,7 +104,10 @@ class TermEntry(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class CompareReport(Report):
-    """Model against readings (``pkm-compare/1``); p-values pay for having looked at everything."""
+    """Model against readings (``pkm-compare/1``); p-values pay for having looked at everything.
+
+    ``noise``: what they count with, that of the model file where it has some.
+    """
 
     FORMAT: ClassVar[str] = "pkm-compare/1"
     effects: tuple[str, ...]
@@ -117,6 +124,7 @@ class CompareReport(Report):
     bad_readings: tuple[BadReadingEntry, ...]
     record: tuple[RemarkEntry, ...]
     advice: str
+    noise: NoiseEntry
     proposed: tuple[TermEntry, ...] = ()
     _found: RunComparison = field(repr=False, compare=False)
     _runs: tuple[str, ...] = field(repr=False, compare=False)
@@ -185,11 +193,11 @@ def compare(
     names, file = names_of(runs), path_of(propose)
     outside_runs(file, names)
     refit, begin = load_refitter(names, tuple(add), path_of(model), watch)
-    fitted = refit.fit(begin)
-    found = compare_fit(fitted, np.random.default_rng(SEED))
-    said = compare_report(found)
+    plain = refit.fit(begin)
+    found = compare_fit(with_noise_of(plain, path_of(model)), np.random.default_rng(SEED))
+    said = {**compare_report(found), "noise": noise_report(found.fit)}
     if file is not None:
-        said["proposed"] = _propose(found, file)
+        said["proposed"] = _propose(plain, file)
     return CompareReport.of(said, _found=found, _runs=names)
 
 
@@ -197,11 +205,11 @@ def _in_um(rms_mm: float) -> float | None:
     return 1000.0 * rms_mm if np.isfinite(rms_mm) else None
 
 
-def _propose(found: RunComparison, path: Path) -> list[dict[str, Any]]:
+def _propose(fitted: Fit, path: Path) -> list[dict[str, Any]]:
     """Write every stable term: FILE, FILE-2 ...; what was found, stable or not."""
     listed: list[dict[str, Any]] = []
     stable = 0
-    for term in propose_terms(found.fit, np.random.default_rng(SEED)):
+    for term in propose_terms(fitted, np.random.default_rng(SEED)):
         file = None
         if term.good:
             stable += 1

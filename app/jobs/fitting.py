@@ -12,8 +12,10 @@ from app.files.residuals import residuals_of_fit
 from app.files.runs import outside_runs
 from app.files.staircase import Way
 from app.jobs.chosen_runs import File, Runs, lines_of, names_of, path_of
+from app.jobs.noise_entries import NoiseEntry
 from app.jobs.record import Record, Report
 from app.jobs.remembering import remember_fit
+from app.noisy import noisy
 from calib.discover.agreement import (
     log_chance,
     more_than_noise,
@@ -21,6 +23,7 @@ from calib.discover.agreement import (
     successive_alike,
 )
 from calib.discover.cables import slack_cables
+from calib.discover.noise_report import noise_report
 from calib.identify import Fit, fit_report
 from calib.identify.beyond import beyond_words
 from calib.identify.staged import fit_effects
@@ -42,7 +45,8 @@ class RemarkEntry(Record):
     """A hypothesis about the record itself, said before any physics.
 
     ``lines`` of ``points.csv`` as (first, last); ``done`` about it for the analysis, ``remedy`` in
-    the files. Where it is not ``settled``, no model is called adequate.
+    the files. Where it is not
+    ``settled`` the answer is the best point that its ``steps`` came to.
     """
 
     name: str
@@ -99,8 +103,9 @@ class FitReport(Report):
     a ``floor`` is what a perfect model would show; ``holdout`` is over poses that were not fitted,
     ``platform`` over the same readings as they were fitted. ``by_kind`` has each kind of reading.
     ``p_value``: how often noise alone leaves a chi-square as large; from 0.01 down a remark says
-    that something is missing. Where it is not ``settled`` the answer is the best point that its
-    ``steps`` came to.
+    that something is missing. ``noise`` is what uncertainties and floors count with: that of the
+    model file, else what the readings demand where nothing but noise is off. Where it is not
+    ``settled`` the answer is the best point that its ``steps`` came to.
     """
 
     FORMAT: ClassVar[str] = "pkm-fit/1"
@@ -126,6 +131,7 @@ class FitReport(Report):
     steps: int
     remarks: tuple[str, ...]
     record: tuple[RemarkEntry, ...]
+    noise: NoiseEntry
     _fit: Fit = field(repr=False, compare=False)
     _runs: tuple[str, ...] = field(repr=False, compare=False)
 
@@ -197,9 +203,11 @@ def fit(
     """
     names = names_of(runs)
     rows, effects = load_rows(names, tuple(add), path_of(model))
-    found = fit_effects(rows, effects, masked_rows(rows, lines_of(mask)))
+    found = noisy(fit_effects(rows, effects, masked_rows(rows, lines_of(mask))), path_of(model))
+    noise = noise_report(found)
     remember_fit(found, names)
     words = (
+        f"As to noise: {noise['words']}" if noise["words"] else "",
         runs_at_odds(found), successive_alike(found), more_than_noise(found), slack_cables(found),
         *beyond_words(found),
     )  # fmt: skip
@@ -212,6 +220,7 @@ def fit(
         "steps": found.steps,
         "remarks": [f"{one}." for one in words if one],
         "record": plain_remarks(record_of(found)),
+        "noise": noise,
     }
     return FitReport.of(said, _fit=found, _runs=names)
 

@@ -14,6 +14,7 @@ from app.files.runs import outside_runs
 from app.jobs.chosen_runs import File, Runs, at_least, names_of, path_of, paths_of
 from app.jobs.posing import PoseEntry
 from app.jobs.record import Report
+from app.noisy import with_noise_of
 from calib.defaults import FOLLOW_UP_FROM
 from calib.discover.design import FollowUpPlan, design_follow_up
 from calib.effects import effect_named
@@ -121,7 +122,7 @@ def design(
     if not effects:
         raise BadInput("no effect is named", remedy="Name two effects, or one and 'nothing'")
     plan = design_follow_up(
-        refit.fit(begin),
+        with_noise_of(refit.fit(begin), path_of(model)),
         effects,
         n,
         np.random.default_rng(seed),

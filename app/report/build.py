@@ -13,6 +13,7 @@ from app.files.fits import read_fit
 from app.files.site import Site
 from app.files.staircase import Way
 from app.history.store import Entry, History
+from app.noisy import noisy
 from app.report.accuracy import Tolerance
 from app.report.html import html_of
 from app.report.issued import note_issued
@@ -98,7 +99,7 @@ def write_report(runs: tuple[str, ...], asked: Asked, outs: Sequence[Path]) -> N
 def record_of_runs(runs: tuple[str, ...], asked: Asked) -> tuple[Page, Site | None]:
     """Fit the runs once more and make the record, with the site whose people it names."""
     rows, effects = load_rows(runs, asked.add, asked.model)
-    found = fit_effects(rows, effects, masked_rows(rows, asked.mask))
+    found = noisy(fit_effects(rows, effects, masked_rows(rows, asked.mask)), asked.model)
     sources = _sources(runs, asked, found)
     way = read_fit(asked.model).way if asked.model is not None else Way()
     now = datetime.now(UTC)

@@ -11,8 +11,10 @@ from app.analysis import looked_at, masked_rows
 from app.files.models import offered_effects, own_effects
 from app.files.runs import read_runs
 from app.jobs.remembering import remember_fit
+from app.noisy import noisy
 from app.tui.reading_lines import ReadingLine, lines_of_fit
 from calib.arrays import Array
+from calib.discover.noise_report import noise_report
 from calib.effects import Effect, effect_named
 from calib.identify import Fit, fit_report
 from calib.identify.staged import fit_effects
@@ -77,7 +79,7 @@ def identify(
 ) -> FitAnswer:
     """Read runs and fit them without the masked lines; raises BadInput."""
     rows, chosen = load_named(runs, effects, own)
-    found = fit_effects(rows, chosen, masked_rows(rows, masked))
+    found = noisy(fit_effects(rows, chosen, masked_rows(rows, masked)), None)
     remember_fit(found, runs)
     return answer_of(runs, found)
 
@@ -89,4 +91,5 @@ def answer_of(runs: tuple[str, ...], found: Fit) -> FitAnswer:
     after = np.linalg.norm(found.linear.residual[:, found.accepted], axis=0)
     effects = tuple(effect.id for effect in found.model.effects)
     said = {**fit_report(found), "record": plain_remarks(record_of(found))}
+    said["noise"] = noise_report(found)
     return FitAnswer(runs, effects, found, said, before, after, tuple(lines_of_fit(found)))

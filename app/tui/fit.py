@@ -168,7 +168,10 @@ def words(answer: "FitAnswer | None") -> Content:
         Content.from_markup("[$ink-warning]![/] $said", said=micro(said))
         for said in remark_lines(report)
     ]
-    if chi2 is not None and chi2 > 1.25:
+    noise = report["noise"]["words"]
+    if noise:
+        parts.append(Content.from_markup("[$ink-warning]![/] As to noise: $said.", said=noise))
+    elif chi2 is not None and chi2 > 1.25:
         parts.append(
             Content.from_markup(
                 "[$ink-warning]![/] More is left than noise: an effect is missing, or the "

@@ -94,17 +94,23 @@ def loose_references(fitted: Fit) -> str:
     )
 
 
-def successive_alike(fitted: Fit) -> str:
-    """Say if readings that follow each other err alike, while they are taken as independent."""
+def neighbours_alike(fitted: Fit) -> float | None:
+    """Correlation of readings that follow each other, where it is no chance; else None."""
     rows, kept = fitted.model.rows, fitted.accepted
     residual, run = fitted.linear.whitened[:, kept], rows.run[kept]
     pair = np.flatnonzero(run[1:] == run[:-1])
     if fitted.whitening is not None or pair.size < FEW_PAIRS:
-        return ""
+        return None
     first, second = residual[:, pair], residual[:, pair + 1]
     scale = math.sqrt(float(np.sum(first**2)) * float(np.sum(second**2)))
     alike = float(np.sum(first * second)) / scale if scale > 0.0 else 0.0
-    if alike * math.sqrt(first.size) < SURELY:
+    return None if alike * math.sqrt(first.size) < SURELY else alike
+
+
+def successive_alike(fitted: Fit) -> str:
+    """Say if readings that follow each other err alike, while they are taken as independent."""
+    alike = neighbours_alike(fitted)
+    if alike is None:
         return ""
     return (
         f"Successive readings err alike ({alike:.2f} between two): noise that lasts, or an effect "
@@ -116,7 +122,8 @@ def log_chance(fitted: Fit) -> float | None:
     """log of the probability that noise alone leaves as much as the fit; None without freedom."""
     if not fitted.dof > 0:
         return None
-    return log_chi2_above(fitted.dof, fitted.chi2)
+    counted = fitted.chi2 if fitted.whitening is None else float(np.sum(fitted.whitened**2))
+    return log_chi2_above(fitted.dof, counted)
 
 
 def more_than_noise(fitted: Fit) -> str:

@@ -67,7 +67,12 @@ def compare_fit(fit: Fit, rng: np.random.Generator) -> RunComparison:
     """Compare a fitted model with its accepted readings."""
     problem = fit.problem
     speaking, together = compare_structure(
-        problem, [*_of_machine(fit), *_of_reading(fit)], quadratics_of(fit), components=3, rng=rng
+        problem,
+        [*_of_machine(fit), *_of_reading(fit)],
+        quadratics_of(fit),
+        components=3,
+        rng=rng,
+        sharing=None if fit.whitening is None else (fit.freed, fit.as_stated),
     )
     platform = fit.model.rows.on_platform
     return RunComparison(

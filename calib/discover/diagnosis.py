@@ -1,7 +1,7 @@
 """Diagnosis of a fitted run: which effect is missing, how large, and what adding it would bring."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -9,7 +9,6 @@ import numpy as np
 from calib.arrays import Array, BoolArray
 from calib.discover.problem import effect_candidates, products_of, quadratics_of, variables_of
 from calib.effects.component import Effect
-from calib.evidence.candidate import Candidate
 from calib.evidence.diagnosis import diagnose
 from calib.evidence.findings import Diagnosis, Finding
 from calib.evidence.structure import structure_candidates
@@ -96,20 +95,6 @@ class RunDiagnosis:
         return chosen.reshape(*columns.shape[:-2], -1)
 
 
-def _freed(fitted: Fit, one: Candidate) -> Candidate:
-    """A candidate in stated sigmas, freed of the noise that the accepted readings share."""
-    whitening, between = fitted.whitening, one.between
-    if whitening is None:
-        return one
-
-    def freed(columns: Array) -> Array:
-        shape = columns.shape
-        return whitening.apply(columns.reshape(*shape[:-1], 3, -1)).reshape(shape)
-
-    at = None if between is None else lambda period: freed(between(period))
-    return replace(one, columns=one.columns.changed(freed), between=at)
-
-
 def diagnose_fit(
     fitted: Fit, catalogue: Sequence[Effect], generator: np.random.Generator
 ) -> RunDiagnosis:
@@ -127,10 +112,11 @@ def diagnose_fit(
     problem = fitted.problem
     columns = effect_columns(fitted, catalogue)
     variables = [*variables_of(fitted), *products_of(fitted)]
+    structure = structure_candidates(variables)
     answer = diagnose(
         problem,
         effect_candidates(fitted, problem, columns),
-        [_freed(fitted, one) for one in structure_candidates(variables)],
+        structure if fitted.whitening is None else [one.changed(fitted.freed) for one in structure],
         quadratics_of(fitted),
         rng=generator,
     )

@@ -14,9 +14,11 @@ from calib.arrays import Array, IntArray
 from calib.effects.component import Effect
 from calib.errors import BadInput
 from calib.identify.fitting import Fit
+from calib.identify.taking import noise_covariance, taken
 from calib.model.columns import whitened_columns
 from calib.model.prediction import Model
-from calib.model.state import State
+from calib.model.state import Linearised, State
+from calib.noise import WHITE, Noise
 from calib.poses.reach import PoseSet
 from calib.runs.commanded import CommandedPath
 from calib.runs.stack import Rows
@@ -112,6 +114,18 @@ def _channel(old: Rows, name: str, given: Mapping[str, float], total: int) -> Ar
     return np.full(total, known[-1])
 
 
+def _corrected(linear: Linearised, noise: Noise) -> Array:
+    """Whitener (3, 3, N) of each new reading by its own noise, the machine's repeatability in it.
+
+    What readings share in time is left aside: a new run has a new frame, and its differences are
+    known no worse for it.
+    """
+    every = np.ones(linear.whitened.shape[1], dtype=bool)
+    own = noise_covariance(linear, replace(noise, scale=noise.narrow), every)
+    own = own + taken(linear, every).variance_by_visit(noise)
+    return np.moveaxis(np.linalg.inv(np.linalg.cholesky(np.moveaxis(own, -1, 0))), 0, -1)
+
+
 class FollowUp:
     """Columns of the readings that a follow-up run could take.
 
@@ -135,8 +149,10 @@ class FollowUp:
         start = replace(start, parameters=state.parameters)
         linear = self.model.linearise(start)
         self.situation = linear.situation
-        self.geometry = linear.jacobian[: self.model.free.size]
-        self.frame = linear.jacobian[self.model.free.size :]
+        self._own = None if fit.noise == WHITE else _corrected(linear, fit.noise)
+        jacobian = self._as_noisy(linear.jacobian)
+        self.geometry = jacobian[: self.model.free.size]
+        self.frame = jacobian[self.model.free.size :]
         self.state: State = linear.state
 
     def approached(self, chosen: Sequence[int]) -> Rows:
@@ -153,7 +169,13 @@ class FollowUp:
         if effect.ends_with_run:
             return np.zeros((int(linear.sum()), 3, rows.count))
         shapes = whitened_columns(effect.signature(situation, values), situation)
-        return np.asarray(shapes[: linear.size][linear])
+        return self._as_noisy(np.asarray(shapes[: linear.size][linear]))
+
+    def _as_noisy(self, columns: Array) -> Array:
+        """Columns (k, 3, N) in stated sigmas as what they are worth with the noise of the fit."""
+        if self._own is None:
+            return columns
+        return np.asarray(np.einsum("ijn,kjn->kin", self._own, columns))
 
     def by_pose(self, columns: Array) -> Array:
         """(k, 3, N) -> (C, k, 3 nests): the block of each candidate pose."""

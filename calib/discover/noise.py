@@ -57,10 +57,10 @@ def judge(fit: Fit, catalogue: Sequence[Effect], seed: int) -> RunDiagnosis:
     for _ in range(ROUNDS):
         if not found.components:
             return answer
-        noisy = with_noise(fit, found.noise)
+        noisy = with_noise(fit, found.noise, found.components)
         answer.diagnosis.scores.release()
         answer = diagnose_fit(noisy, catalogue, np.random.default_rng(seed))
-        answer = replace(answer, noise=found, inflation=inflation(fit, noisy))
+        answer = replace(answer, noise=found, inflation=noisy.inflation)
         still = {one.name for one in answer.diagnosis.joined}
         left = tuple(one for one in kept if one.name in still)
         if len(left) == len(kept):
@@ -106,12 +106,6 @@ def _likelier(problem: LinearProblem, larger: LinearProblem) -> float:
 def _worth(found: Found) -> float:
     """Log of what noise explains, less what the freedom of its components does by chance."""
     return found.gain - found.price
-
-
-def inflation(white: Fit, noisy: Fit) -> float:
-    """Median ratio of the uncertainties with noise and as stated, over what is identified."""
-    known = white.sigmas < 0.5 * white.model.prior
-    return float(np.median(noisy.sigmas[known] / white.sigmas[known])) if known.any() else 1.0
 
 
 def _suspicious(white: RunDiagnosis) -> bool:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from calib.digits import plus_minus
-from calib.discover.diagnosis import RunDiagnosis
+from calib.identify.fitting import Fit
 from calib.noise import Component
 from calib.noise.scatter import ACROSS, ADDED, ADDED_ANGLE, ALONG, RANGE
 
@@ -14,27 +14,27 @@ CLEAR = 1e-3
 """p-value up to which a component is spoken of; a weaker one only counts in judging effects."""
 
 
-def noise_report(found: RunDiagnosis) -> dict[str, Any]:
-    """Entry ``noise`` of diagnosis and discovery."""
+def noise_report(fit: Fit) -> dict[str, Any]:
+    """Entry ``noise`` of a fit, of its diagnosis or of a discovery."""
     return {
-        "components": [_entry(found, one) for one in found.noise.components],
-        "uncertainty_ratio": found.inflation,
-        "words": noise_words(found),
+        "components": [_entry(fit, one) for one in fit.components_of_noise],
+        "uncertainty_ratio": fit.inflation,
+        "words": noise_words(fit),
     }
 
 
-def noise_words(found: RunDiagnosis) -> str:
+def noise_words(fit: Fit) -> str:
     """What is clear of the noise, without a full stop; empty if the readings are as they say."""
-    told = [_says(found, one) for one in found.noise.components if one.p_value < CLEAR]
+    told = [_says(fit, one) for one in fit.components_of_noise if one.p_value < CLEAR]
     if not told:
         return ""
-    ratio = f"{found.inflation:.2g} times those"
+    ratio = f"{fit.inflation:.2g} times those"
     of = "those" if ratio.startswith("1 ") else ratio
     return f"{'; '.join(told)}. Uncertainties are {of} of white noise"
 
 
-def _entry(found: RunDiagnosis, one: Component) -> dict[str, Any]:
-    size, unit = _scale(found, one)
+def _entry(fit: Fit, one: Component) -> dict[str, Any]:
+    size, unit = _scale(fit, one)
     name, of = _named(one)
     return {
         "name": name,
@@ -56,7 +56,7 @@ def _named(one: Component) -> tuple[str, str]:
     return "scale-of", f"{one.name} the beam" if one.name in (ALONG, ACROSS) else one.name
 
 
-def _scale(found: RunDiagnosis, one: Component) -> tuple[float, str]:
+def _scale(fit: Fit, one: Component) -> tuple[float, str]:
     """Factor and unit of a component's value: s, a ratio, or the first actuator's unit."""
     if one.name == "correlated":
         return 1.0, "s"
@@ -64,7 +64,7 @@ def _scale(found: RunDiagnosis, one: Component) -> tuple[float, str]:
         return 1.0, _ADDED[one.name][1]
     if one.name != "visit":
         return 1.0, "1"
-    axis = found.fit.model.rows.machine.axes[0]
+    axis = fit.model.rows.machine.axes[0]
     return axis.usual_error, axis.unit
 
 
@@ -72,11 +72,11 @@ _ADDED = {ADDED: ("lengths", "um"), ADDED_ANGLE: ("angles", "arcsec"), RANGE: ("
 """Of what readings something is added to the scatter, and its unit."""
 
 
-def _says(found: RunDiagnosis, one: Component) -> str:
+def _says(fit: Fit, one: Component) -> str:
     if one.name in ("correlated", "walk"):
-        return _in_time(found, one)
+        return _in_time(fit, one)
     if one.name == "visit":
-        return _of_visits(found, one)
+        return _of_visits(fit, one)
     if one.name == "scale":
         return (
             f"readings scatter {plus_minus(one.value, one.sigma)} times as much as sx, sy, sz say"
@@ -98,22 +98,22 @@ def _says(found: RunDiagnosis, one: Component) -> str:
     return f"readings of the {of} {times}"
 
 
-def _in_time(found: RunDiagnosis, one: Component) -> str:
+def _in_time(fit: Fit, one: Component) -> str:
     if one.name == "walk":
         return (
             f"the noise wanders by {plus_minus(one.value, one.sigma)} sigma from one reading to "
             "the next, and does not come back within the run"
         )
-    noise = found.noise.noise
-    alike = noise.share * float(np.exp(-found.fit.taking.usual_gap_s / one.value))
+    noise = fit.noise
+    alike = noise.share * float(np.exp(-fit.taking.usual_gap_s / one.value))
     return (
         f"the noise is correlated over {_time(one.value, one.sigma)} "
         f"({alike:.2f} between successive readings)"
     )
 
 
-def _of_visits(found: RunDiagnosis, one: Component) -> str:
-    size, unit = _scale(found, one)
+def _of_visits(fit: Fit, one: Component) -> str:
+    size, unit = _scale(fit, one)
     factor, unit = (1000.0, "um") if unit == "mm" else (1e6, "urad")
     value, sigma = factor * size * one.value, factor * size * one.sigma
     return (

@@ -48,7 +48,7 @@ def diagnosis_report(found: RunDiagnosis) -> dict[str, Any]:
         "indistinguishable": [list(group) for group in diagnosis.indistinguishable],
         "unexplained": _unexplained(diagnosis),
         "likeness": likeness_of(diagnosis) if diagnosis.best is None else None,
-        "noise": noise_report(found),
+        "noise": noise_report(found.fit),
         "bad_readings": bad_readings(found.fit),
         "unavailable": found.unavailable,
         "not_on_this_machine": not_defined(found.fit.model.machine),
@@ -77,7 +77,7 @@ def discovery_report(discovery: Discovery) -> dict[str, Any]:
         "indistinguishable": [list(group) for group in _groups(discovery)],
         "unexplained": _unexplained(last.diagnosis),
         "likeness": likeness_of_found(discovery),
-        "noise": noise_report(last),
+        "noise": noise_report(last.fit),
         "bad_readings": bad_readings(last.fit),
         "parameters": effect_parameters(last.fit),
         "refused": [name for name in discovery.refused if name not in discovery.impossible],
@@ -256,7 +256,7 @@ def _of_physics(
     if poses < FEW_POSES:
         named = "one pose" if poses == 1 else f"{poses} poses"
         excluded += f" With {named} only large effects would show: measure more."
-    told = noise_words(found)
+    told = noise_words(found.fit)
     kinds = {one.name for one in found.noise.components}
     scatter = "" if told and "scale" not in kinds else untrue_uncertainties(found.fit)
     if scatter and kinds <= {"scale"}:

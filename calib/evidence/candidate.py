@@ -1,7 +1,7 @@
 """What could be missing: a named group of columns, at one or several trial values."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -59,6 +59,12 @@ class Candidate:
     def prior_precision(self) -> Array:
         """1 / sigma^2 (k,); where there is no prior, that of a thousand sizes."""
         return 1.0 / np.array([unknown.prior_sigma for unknown in self.unknowns]) ** 2
+
+    def changed(self, how: Callable[[Array], Array]) -> "Candidate":
+        """The same with all columns (..., R) changed by ``how``."""
+        at = self.between
+        between = None if at is None else lambda period: how(at(period))
+        return replace(self, columns=self.columns.changed(how), between=between)
 
     @cached_property
     def hypotheses(self) -> tuple[tuple[int, ...], ...]:

@@ -7,7 +7,7 @@ absorbed is accounted for, and the prior of twice the response's size stands for
 Their mean is taken off: a constant is nobody's dependence.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -23,6 +23,7 @@ from calib.evidence.scores import Scores, score
 from calib.evidence.structure import Response, Variable, structure_candidates
 
 MOST_BINS = 8
+Sharing = tuple[Callable[[Array], Array], LinearProblem]
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,7 @@ def compare_structure(
     components: int,
     rng: np.random.Generator,
     alpha: float = ALPHA,
+    sharing: Sharing | None = None,
 ) -> tuple[list[Speaking], list[JointTest]]:
     """Look at the residual against every variable, the one with the most structure first.
 
@@ -103,11 +105,16 @@ def compare_structure(
         Components of a reading.
     rng : numpy Generator
         Draws the null distribution.
+    sharing : (callable, LinearProblem), optional
+        Where readings share noise: what makes columns (..., R) in stated sigmas white, as those of
+        ``problem`` are, and the problem in stated sigmas.
     """
     named = [
         (variable, found) for variable in variables for found in structure_candidates([variable])
     ]
-    scores = score(problem, [found for _, found in named], rng, DRAWS)
+    free = _as_it_is if sharing is None else sharing[0]
+    asked = [found if sharing is None else found.changed(free) for _, found in named]
+    scores = score(problem, asked, rng, DRAWS)
     tests = [test.level(scores.residuals) for test in quadratic]
     levels = [*scores.levels, *tests]
     if not levels:
@@ -121,7 +128,11 @@ def compare_structure(
     speaking = []
     for index in sorted(best.values(), key=lambda index: joint.own_log_p[index]):
         log_p = joint.log_p(float(joint.strengths[index, 0]))
-        speaking.append(_speaking(scores, index, named[index][0], log_p, alpha, components))
+        one = _speaking(scores, index, named[index][0], log_p, alpha, components, free)
+        if sharing is not None:
+            as_stated = signature_of(scores, index, named[index][1])[0]
+            one = replace(one, fitted=sharing[1].project(as_stated))
+        speaking.append(one)
     together = []
     for number, test in enumerate(quadratic):
         log_p = joint.log_p(float(joint.strengths[len(named) + number, 0]))
@@ -129,8 +140,18 @@ def compare_structure(
     return speaking, together
 
 
+def _as_it_is(columns: Array) -> Array:
+    return columns
+
+
 def _speaking(
-    scores: Scores, index: int, variable: Variable, log_p: float, alpha: float, components: int
+    scores: Scores,
+    index: int,
+    variable: Variable,
+    log_p: float,
+    alpha: float,
+    components: int,
+    free: Callable[[Array], Array],
 ) -> Speaking:
     """Describe the dependence behind one candidate."""
     candidate = scores.candidates[index]
@@ -143,7 +164,7 @@ def _speaking(
     if period is not None:
         shown = replace(variable, values=np.mod(variable.values, period))
     pictures = [
-        _binned(scores.problem, shown, response, axis, components)
+        _binned(scores.problem, shown, response, axis, components, free)
         for axis in range(response.columns.shape[0])
     ]
     # Of a single bin nothing can differ: its sigma is zero.
@@ -165,7 +186,12 @@ def _speaking(
 
 
 def _binned(
-    problem: LinearProblem, variable: Variable, response: Response, axis: int, components: int
+    problem: LinearProblem,
+    variable: Variable,
+    response: Response,
+    axis: int,
+    components: int,
+    free: Callable[[Array], Array],
 ) -> tuple[Bin, ...]:
     """Estimates per bin of a variable along one direction of a response."""
     column = response.columns[axis]
@@ -175,7 +201,7 @@ def _binned(
         return ()
     edges = _edges(values[seen])
     inside = np.array([seen & (values >= low) & (values <= high) for low, high in edges])
-    shapes = column * inside
+    shapes = free(column * inside)
     size = response.scale(axis)[1]
     weight = shapes @ problem.project(shapes).T + np.eye(len(edges)) / (2.0 * size) ** 2
     covariance = np.linalg.inv(weight)

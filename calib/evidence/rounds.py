@@ -8,6 +8,7 @@ import numpy as np
 
 from calib.arrays import Array
 from calib.evidence.bayes import observed
+from calib.evidence.candidate import Candidate
 from calib.evidence.family import Family, family, significant
 from calib.evidence.quadratic import Quadratic
 from calib.evidence.scored import Scored
@@ -120,10 +121,15 @@ def best_hypothesis(scores: Scored, index: int) -> tuple[int, int]:
     return number, int(np.argmax(parts[number][:, 0]))
 
 
-def signature_of(scores: Scores, index: int) -> tuple[Array, int, int]:
-    """Signature (R,) of a candidate's best hypothesis at its estimate; hypothesis and trial."""
+def signature_of(
+    scores: Scores, index: int, like: Candidate | None = None
+) -> tuple[Array, int, int]:
+    """Signature (R,) of a candidate's best hypothesis at its estimate; hypothesis and trial.
+
+    ``like``: the same candidate with other columns, of which the signature is made.
+    """
     number, trial = best_hypothesis(scores, index)
-    candidate = scores.candidates[index]
+    candidate = like or scores.candidates[index]
     subset = candidate.hypotheses[number]
     beta, _ = scores.estimate(index, trial, subset)
     return beta @ candidate.columns[trial][list(subset)], number, trial

@@ -16,7 +16,7 @@ from calib.identify.taking import noise_covariance, taken
 from calib.mechanism.rigid import euler_rates, to_euler
 from calib.model.prediction import Model
 from calib.model.state import Linearised, State
-from calib.noise import WHITE, Noise, Taking, Whitening
+from calib.noise import WHITE, Component, Noise, Taking, Whitening
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +42,10 @@ class Fit:
     noise, whitening : Noise, Whitening or None
         Components of the noise that the optimum counts with, and what frees the accepted readings
         of what they share; None where the readings are taken as independent, as stated.
+    components_of_noise : tuple of Component
+        What is known of the noise: values with uncertainties.
+    inflation : float
+        Median ratio of the uncertainties with this noise and as stated, over what is identified.
     """
 
     model: Model
@@ -54,6 +58,8 @@ class Fit:
     settled: bool = True
     noise: Noise = WHITE
     whitening: Whitening | None = None
+    components_of_noise: tuple[Component, ...] = ()
+    inflation: float = 1.0
 
     def whiten(self, columns: Array) -> Array:
         """Columns (..., 3, N) in stated sigmas for the accepted readings, white, (..., 3 A)."""
@@ -61,6 +67,13 @@ class Fit:
         if self.whitening is not None:
             chosen = self.whitening.apply(chosen)
         return np.ascontiguousarray(chosen.reshape(*columns.shape[:-2], -1))
+
+    def freed(self, columns: Array) -> Array:
+        """Columns (..., 3 A) of the accepted readings in stated sigmas, made white."""
+        if self.whitening is None:
+            return columns
+        shape = columns.shape
+        return self.whitening.apply(columns.reshape(*shape[:-1], 3, -1)).reshape(shape)
 
     @cached_property
     def jacobian(self) -> Array:
@@ -89,9 +102,20 @@ class Fit:
     @property
     def problem(self) -> LinearProblem:
         """The fit as a linear problem over its accepted readings."""
+        return LinearProblem(self.whitened, self.jacobian, self.prior_precision, self._live)
+
+    @property
+    def as_stated(self) -> LinearProblem:
+        """The same in stated sigmas, whatever noise the readings share."""
+        kept = self.accepted
+        jacobian = self.linear.jacobian[:, :, kept].reshape(self.prior_precision.size, -1)
+        residual = self.linear.whitened[:, kept].reshape(-1)
+        return LinearProblem(residual, jacobian, self.prior_precision, self._live)
+
+    @property
+    def _live(self) -> BoolArray | None:
         rows = self.model.rows
-        live = None if rows.sensed is None else rows.live[:, self.accepted].reshape(-1)
-        return LinearProblem(self.whitened, self.jacobian, self.prior_precision, live)
+        return None if rows.sensed is None else rows.live[:, self.accepted].reshape(-1)
 
     @cached_property
     def values(self) -> Array:
@@ -209,16 +233,30 @@ def _root_mean(squares: float, count: int) -> float:
     return float(np.sqrt(squares / count)) if count else float("nan")
 
 
-def with_noise(fit: Fit, noise: Noise) -> Fit:
+def with_noise(fit: Fit, noise: Noise, components: tuple[Component, ...] = ()) -> Fit:
     """The same readings fitted with what their noise really is."""
     if noise == WHITE:
         return fit
     whitening = Whitening(fit.taking, noise)
     found = optimise(fit.model, fit.linear, fit.accepted, whitening)
     return replace(
-        fit, linear=found.linear, step_covariance=found.covariance, noise=noise,
-        steps=fit.steps + found.steps, settled=fit.settled and found.settled, whitening=whitening,
-    )  # fmt: skip
+        fit,
+        linear=found.linear,
+        step_covariance=found.covariance,
+        noise=noise,
+        components_of_noise=components,
+        steps=fit.steps + found.steps,
+        settled=fit.settled and found.settled,
+        whitening=whitening,
+        inflation=_inflation(fit, found.covariance),
+    )
+
+
+def _inflation(white: Fit, step_covariance: Array) -> float:
+    before = np.sqrt(np.diag(white.step_covariance))
+    known = before < 0.5 * white.model.prior
+    after = np.sqrt(np.diag(step_covariance))
+    return float(np.median(after[known] / before[known])) if known.any() else 1.0
 
 
 def frame_values(state: State, run: int) -> Array:

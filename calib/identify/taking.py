@@ -75,6 +75,8 @@ def _name(rows: Rows, run: int) -> str:
 
 def _instruments(rows: Rows) -> list[str]:
     """Who took each reading, where the run says it."""
+    if rows.sensed is None:
+        return [""] * rows.count
     found = []
     for run, line in zip(rows.run, rows.line, strict=True):
         own = rows.runs[run]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from app.files.machines import load_machine
+from calib.discover.diagnosis import RunDiagnosis
 from calib.discover.discovery import Refitter, discover_run, stage_of
 from calib.discover.noise_report import noise_words
 from calib.effects import catalogue
@@ -38,6 +39,11 @@ def measured(hidden: dict[str, float], rho: float, seed: int, *, walk: float = 0
     return replace(rows, position=quiet.position + SIGMA_MM * noise)
 
 
+def words(found: RunDiagnosis) -> str:
+    """What is said of the noise."""
+    return noise_words(found.fit)
+
+
 @pytest.mark.parametrize(
     ("hidden", "expected"), [({}, ()), ({"backlash.leg3": 0.03}, ("backlash",))]
 )
@@ -47,7 +53,7 @@ def test_correlated_noise_is_named_and_nothing_else_but_what_is_there(hidden, ex
     last = stage_of(found).run
     assert found.last.effects == expected
     assert last.diagnosis.adequate
-    assert "the noise is correlated over" in noise_words(last)
+    assert "the noise is correlated over" in words(last)
     assert last.noise.components[0].name == "correlated"
     assert last.noise.components[0].p_value < 1e-6
 
@@ -58,4 +64,4 @@ def test_a_wandering_tracker_and_one_that_drifts_are_told_apart(hidden, expected
     answer = Refitter(rows, catalogue(rows.machine))(()).run
     assert answer.diagnosis.explained_by == expected
     assert [one.name for one in answer.noise.components] == ([] if hidden else ["walk"])
-    assert ("the noise wanders by" in noise_words(answer)) == (not hidden)
+    assert ("the noise wanders by" in words(answer)) == (not hidden)

@@ -51,7 +51,12 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+LONG = ("across", "range")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.long if name in LONG else ()) for name in CASES]
+)
 def test_scatter_is_found_back_with_honest_uncertainty(name: str) -> None:
     noise = CASES[name]
     pulls = []

@@ -33,7 +33,10 @@ def discovered(condition: str, hidden: Hidden) -> dict:
 
 @pytest.mark.parametrize(
     ("condition", "of_what"),
-    [("nest:1.7", f"nest {nest_of(simulate(PLAN))}"), ("along:1.6", "along the beam")],
+    [
+        ("nest:1.7", f"nest {nest_of(simulate(PLAN))}"),
+        pytest.param("along:1.6", "along the beam", marks=pytest.mark.long),
+    ],
 )
 @pytest.mark.parametrize(
     "hidden",

@@ -76,7 +76,7 @@ FIELDS = {
     "minutes predicted_um verified_um at_most_um",
     "CompareReport": "effects readings rms_um noise_floor_um chi2_per_dof repeatability "
     "reference_repeatability structure together actuators worst_poses bad_readings record advice "
-    "proposed",
+    "noise proposed",
     "CompletionReport": "machine tried parameters rank_before rank_after lacking proposal",
     "CorrectReport": "machine model actuators effects left_out remarks channels poses",
     "DiagnosisReport": "baseline adequate record candidates indistinguishable unexplained likeness "
@@ -86,7 +86,7 @@ FIELDS = {
     "FitReport": "effects readings chi2_per_dof log10_p p_value rms_um noise_floor_um "
     "holdout_rms_um holdout_floor_um platform_rms_um platform_floor_um by_kind "
     "parameters unidentified unidentified_words bad_readings left_out_readings channels_left_aside "
-    "settled steps remarks record",
+    "settled steps remarks record noise",
     "FleetReport": "machine effects parameters machines outliers remarks",
     "FollowUpReport": "machine discriminate model runs conditions right_now right_then poses "
     "advice",

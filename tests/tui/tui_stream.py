@@ -344,6 +344,7 @@ def fitted() -> FitAnswer:
         "unidentified_words": [f"{name} is not seen" for name in alone],
         "bad_readings": [{"line": 118, "why": "reads as nest 4, was labelled 5"}],
         "left_out_readings": 0,
+        "noise": {"components": [], "uncertainty_ratio": 1.0, "words": ""},
     }
     generator = np.random.default_rng(3)
     before, after = np.abs(generator.normal(0.0, [[0.25], [0.006]], (2, 95)))
