@@ -36,6 +36,9 @@ from calib.mechanism.task import FULL, task_error, task_rows, task_values
 PATIENCE = 40
 """Passes without one more command of a sequence solved, after which the rest is given up."""
 
+STEEPEST = 0.1
+"""Growth of what effects add, per unit of way, beyond which it is a jump and no trend."""
+
 UNREACHABLE = "it cannot be reached: the limbs do not close"
 BEHIND = "it comes after a pose that does not converge"
 STUCK = "it does not converge: no command near it makes up for all effects of the model"
@@ -64,6 +67,8 @@ class Commands:
         What was commanded, these included in their order; of alternatives that of before.
     plain : (n, N)
         Extensions by the geometry alone, mm or rad.
+    trend : (n, 1)
+        How what is added to it grew with it up to the last command; zero where that jumped.
     """
 
     wanted: Array
@@ -76,6 +81,7 @@ class Commands:
     history: History
     standing: Standpoint
     plain: Array
+    trend: Array
 
     @property
     def solved(self) -> BoolArray:
@@ -206,8 +212,9 @@ def _solved(
     kept = np.array([not why for why in refused], dtype=bool)
     begin, near = plain.extension, None
     if after is not None:
-        begin = begin + (after.extension - after.plain)[:, -1:]
-        near = after.standing.last(kept.size)
+        grown = after.trend * (plain.extension - after.plain[:, -1:])
+        begin = begin + (after.extension - after.plain)[:, -1:] + grown
+        near = after.standing.last(kept.size, -grown)
     extension = np.where(kept, begin, history.extension[:, -1:])
     passes = best = waited = 0
     while True:
@@ -239,7 +246,24 @@ def _solved(
         np.concatenate([history.extension, extension[:, solved]], axis=1),
         np.concatenate([history.time_s, times[solved]]),
     )
-    return Commands(goal, extension, q, near.poses, miss, passes, why, told, near, plain.extension)
+    trend = _trend(identified, extension, plain.extension, after)
+    return Commands(
+        goal, extension, q, near.poses, miss, passes, why, told, near, plain.extension, trend
+    )
+
+
+def _trend(identified: Identified, extension: Array, plain: Array, after: Commands | None) -> Array:
+    """:attr:`Commands.trend` by the last two commands, those before included."""
+    if after is not None and plain.shape[1] == 1:
+        extension = np.concatenate([after.extension[:, -1:], extension], axis=1)
+        plain = np.concatenate([after.plain[:, -1:], plain], axis=1)
+    if plain.shape[1] < 2:
+        return np.zeros((plain.shape[0], 1))
+    way = plain[:, -1] - plain[:, -2]
+    grown = extension[:, -1] - extension[:, -2] - way
+    with np.errstate(invalid="ignore"):
+        smooth = (np.abs(way) > identified.motion) & (np.abs(grown) <= STEEPEST * np.abs(way))
+        return np.asarray(np.where(smooth, grown / np.where(smooth, way, 1.0), 0.0)[:, None])
 
 
 def _error(identified: Identified, goal: Array, near: Standpoint) -> Array:

@@ -65,8 +65,11 @@ class Standpoint:
         """Whether the machine closes, and its effects agree with where it stands, (N,)."""
         return self.closed.converged & (self.unrest <= AGREED)
 
-    def last(self, count: int) -> "Standpoint":
-        """The last of its commands as where to begin ``count`` others nearby."""
+    def last(self, count: int, grown: Array) -> "Standpoint":
+        """The last of its commands as where to begin ``count`` others nearby.
+
+        ``grown`` (n, count): by how much what its effects do to the extensions may have grown.
+        """
         done = self._done
         parameters = None
         if done.parameters is not None:
@@ -75,7 +78,7 @@ class Standpoint:
             self,
             closed=self.closed.take(slice(self.closed.count - 1, self.closed.count)),
             _done=_Changes(
-                np.repeat(done.extension[:, -1:], count, axis=1),
+                done.extension[:, -1:] + grown,
                 parameters,
                 np.repeat(done.twist[:, -1:], count, axis=1),
             ),

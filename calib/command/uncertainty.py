@@ -7,18 +7,17 @@ import numpy as np
 from calib.arrays import Array
 from calib.command.identified import Identified
 from calib.command.standing import Standpoint
+from calib.mechanism.jacobian import pose_jacobians
 
 
 def pose_columns(identified: Identified, at: Standpoint) -> dict[str, Array]:
     """Twist (6, N) of the platform per unit of each parameter and unknown, base axes, by name."""
+    names = [parameter.name for parameter in identified.machine.parameters]
+    if not identified.effects:  # nothing else has to be asked
+        twists = pose_jacobians(identified.closing, at.closed, identified.parameters).parameters
+        return dict(zip(names, twists, strict=True))
     situation = at.situation
-    columns = dict(
-        zip(
-            (parameter.name for parameter in identified.machine.parameters),
-            situation.state_twists,
-            strict=True,
-        )
-    )
+    columns = dict(zip(names, situation.state_twists, strict=True))
     for found in identified.effects:
         signature = found.effect.signature(situation, found.values)
         for k, name in enumerate(found.names):
@@ -50,7 +49,7 @@ def pose_covariance(
     columns = pose_columns(identified, at)
     kept = [k for k, name in enumerate(names) if name in columns]
     stacked = np.array([columns[names[k]] for k in kept])
-    count = at.situation.rows.count
+    count = at.closed.count
     stacked = stacked.reshape(len(kept), 6, count)
     spread = covariance[np.ix_(kept, kept)] @ stacked.reshape(len(kept), -1)
     return np.asarray(np.einsum("pcn,pdn->cdn", stacked, spread.reshape(stacked.shape)))
