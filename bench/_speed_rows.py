@@ -116,7 +116,10 @@ def kinematics() -> Iterator[Row]:
 def derivatives() -> Iterator[Row]:
     """The hexapod with its arms beside its closed form."""
     machine = load_machine("hexapod")
-    at = sample_poses(machine, POSES, np.random.default_rng(1)).configuration
+    chosen = sample_poses(machine, POSES, np.random.default_rng(1))
+    at, task = chosen.configuration, np.ascontiguousarray(chosen.task)
+    old, new = both(lambda: inverse(machine, task), 20)
+    yield Row("hexapod: inverse in batches, a pose", old / POSES, new / POSES, None, "")
     closed = HexapodClosedForm(machine)
     legs = closed.forward(at.extension)
     agrees(legs.position, at.poses.position)
@@ -195,6 +198,7 @@ def verbs(folder: Path) -> Iterator[Row]:
     ):
         old, new = asked(words, False, 3)[0], asked(words, True, 3)[0]
         yield Row(what, old, new, peer, "`import numpy, scipy`", "s")
+    yield from monte_carlo()
     run = str(folder / "run")
     hidden = ["--effect", "backlash.leg3=0.015", "--order", "pose-by-pose"]
     asked(
@@ -206,6 +210,17 @@ def verbs(folder: Path) -> Iterator[Row]:
         what = f"`pkmcal {verb}` on 1,000 poses x 3"
         yield Row(what, old[0], new[0], reading[0], "`pkmcal fit` of the same", "s")
         yield Row(f"{what}, memory", old[1], new[1], reading[1], "`pkmcal fit` of the same", "MB")
+
+
+def monte_carlo() -> Iterator[Row]:
+    """A thousand machines drawn, measured and identified by two processes: CPU of both."""
+    words = ["-m", "pkmcal", "identifiability", "hexapod", "--monte-carlo", str(DRAWS)]
+    old, new = (asked([*words, "--workers", "2"], compiled)[0] for compiled in (False, True))
+    one = asked([*words, "--workers", "1"], True)[0]
+    yield Row(
+        f"`pkmcal identifiability --monte-carlo {DRAWS}`, two processes, CPU of both",
+        old, new, one, "the same by one process", "s",
+    )  # fmt: skip
 
 
 def load() -> str:
