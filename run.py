@@ -31,20 +31,24 @@ CHECKS = (
 )
 
 
-def ensure_environment(extra: str) -> None:
-    """Create the environment and install the pinned packages, unless that is done already."""
+def ensure_environment(*extras: str) -> None:
+    """Create the environment and install the pinned packages, unless that is done already.
+
+    Extras that are asked for together are installed, and the compiled parts built, at once.
+    """
     built_from = [ROOT / "pyproject.toml", ROOT / "constraints.txt"]
     built_from += sorted((ROOT / "calib" / "mechanism" / "core").iterdir())
     wanted = hashlib.sha256(
         b"".join(path.read_bytes() for path in built_from) + sys.version.encode()
     ).hexdigest()
-    stamp = ENVIRONMENT / f"installed-{extra or 'base'}"
-    if PYTHON.exists() and stamp.exists() and stamp.read_text() == wanted:
+    stamps = [ENVIRONMENT / f"installed-{extra or 'base'}" for extra in extras]
+    if PYTHON.exists() and all(one.exists() and one.read_text() == wanted for one in stamps):
         return
     print("Installing pkmcal and its pinned dependencies into .venv ...", flush=True)
     if not PYTHON.exists():
         venv.create(ENVIRONMENT, with_pip=True)
-    target = f"{ROOT}[{extra}]" if extra else str(ROOT)
+    named = ",".join(filter(None, extras))
+    target = f"{ROOT}[{named}]" if named else str(ROOT)
     constraints = str(ROOT / "constraints.txt")
     subprocess.run(
         [
@@ -61,7 +65,8 @@ def ensure_environment(extra: str) -> None:
         ],
         check=True,
     )
-    stamp.write_text(wanted)
+    for stamp in stamps:
+        stamp.write_text(wanted)
 
 
 def run(*command: str) -> int:
@@ -77,7 +82,8 @@ def main(arguments: list[str]) -> int:
         return run("pkmcal", *(["demo"] if job == "demo" else []), *rest)
     if job == "test":
         ensure_environment("dev")
-        return run("pytest", *(rest or ["-n", "4"]))  # half of the time they wait for machines
+        # Half of the time they wait for machines; what stands together shares its fixtures.
+        return run("pytest", "--dist", "worksteal", *(rest or ["-n", "4"]))
     if job == "check":
         ensure_environment("dev")
         return max(run(*check) for check in CHECKS)

@@ -4,9 +4,11 @@ Readings that do not fit the majority are left out: they are tried against rando
 readings.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
-from calib.arrays import Array, BoolArray
+from calib.arrays import Array, BoolArray, IntArray
 from calib.frames import align
 
 TRIPLES = 400
@@ -46,10 +48,8 @@ def robust_align(base: Array, tracker: Array, slack: Array) -> tuple[Array, Arra
     inside = misfit(base, tracker, rotation, position) < slack
     if inside.all():
         return rotation, position, inside
-    best = inside
-    for trial in _trials(base, tracker, slack):
-        if trial.sum() > best.sum():
-            best = trial
+    trials = np.concatenate([inside[None], _trials(base, tracker, slack)])
+    best = trials[np.argmax(trials.sum(axis=1))]
     for _ in range(5):
         if best.sum() < 3:
             break
@@ -63,9 +63,7 @@ def robust_align(base: Array, tracker: Array, slack: Array) -> tuple[Array, Arra
 
 def _trials(base: Array, tracker: Array, slack: Array) -> BoolArray:
     """Readings (T, N) inside after aligning each of T random triples that are on no line."""
-    generator = np.random.default_rng(0)  # the same triples every time: a fit is a pure function
-    count = base.shape[1]
-    three = np.array([generator.choice(count, 3, replace=False) for _ in range(TRIPLES)])
+    three = _triples(base.shape[1])
     points, seen = np.moveaxis(base[:, three], 0, 1), np.moveaxis(tracker[:, three], 0, 1)
     centre, seen_centre = points.mean(axis=2), seen.mean(axis=2)
     points = points - centre[:, :, None]
@@ -76,6 +74,15 @@ def _trials(base: Array, tracker: Array, slack: Array) -> BoolArray:
     rotation = u @ vt
     apart = tracker - rotation @ (base - centre[:, :, None]) - seen_centre[:, :, None]
     return np.asarray(np.sum(apart * apart, axis=1)[plane] < slack**2)
+
+
+@lru_cache(maxsize=256)
+def _triples(count: int) -> IntArray:
+    """Random triples (T, 3) of so many readings; the same every time: a fit is a pure function."""
+    generator = np.random.default_rng(0)
+    three = np.array([generator.choice(count, 3, replace=False) for _ in range(TRIPLES)])
+    three.setflags(write=False)
+    return three
 
 
 def moved_together(base: Array, tracker: Array, slack: Array) -> BoolArray:

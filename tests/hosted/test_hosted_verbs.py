@@ -78,10 +78,10 @@ def store_of(site_file: Path) -> HostStore:
 
 def test_verify_measure_fit_apply_verify_undo(verbs: Verbs, station: Path) -> None:
     labels = list(np.random.default_rng(2).permutation(list(GRID)))
-    check = verbs.poses("check.csv", labels[:6])
+    check = verbs.poses("check.csv", labels[:3])
     before = verbs.verified(check)
     sessions = str(verbs.folder / "sessions")
-    words = ["measure", "--poses", verbs.poses("poses.csv", labels[6:28])]
+    words = ["measure", "--poses", verbs.poses("poses.csv", labels[6:24])]
     verbs(*words, "--no-warm-up", "--unattended", "--folder", sessions)
     (measured,) = Path(sessions).glob("*-measure/run")
     header = (measured / "run.toml").read_text(encoding="utf-8")

@@ -55,7 +55,7 @@ def test_the_whole_job_without_a_person(
         measured = station.measure(poses.by_label(), warm_up=False)
         assert measured.readings == pkmcal.fit(measured.run).readings
         pkmcal.fit(measured.run).save(model)
-        before = station.verify(grid(5))
+        before = station.verify(grid(3))
 
         with pytest.raises(pkmcal.BadInput, match="nobody is there to confirm"):
             station.apply(model)
@@ -66,7 +66,7 @@ def test_the_whole_job_without_a_person(
         done = station.apply(model, yes=True)
         assert done.written
         assert [(c.name, c.new) for c in done.changes] == [(c.name, c.new) for c in asked.changes]
-        after = station.verify(grid(5), before=before)
+        after = station.verify(grid(3), before=before)
         assert after.before is not None
         assert after.before.measured == before.measured
         assert after.measured.position_peak_um < 0.2 * before.measured.position_peak_um
@@ -94,7 +94,7 @@ def test_script_and_verb_verify_alike(
     table = tmp_path / "poses.csv"
     table.write_text(
         "pose,x,y,z,rx,ry,rz\n"
-        + "".join(f"{label},{','.join(map(str, pose))}\n" for label, pose in grid(4).items()),
+        + "".join(f"{label},{','.join(map(str, pose))}\n" for label, pose in grid(2).items()),
         "utf-8",
     )
     words = ["--site", str(site), "--poses", str(table), "--folder", str(tmp_path / "theirs")]
