@@ -37,7 +37,7 @@ def ensure_environment(*extras: str) -> None:
     Extras that are asked for together are installed, and the compiled parts built, at once.
     """
     built_from = [ROOT / "pyproject.toml", ROOT / "constraints.txt"]
-    built_from += sorted((ROOT / "calib" / "mechanism" / "core").iterdir())
+    built_from += sorted((ROOT / "calib").glob("*/core/*"))
     wanted = hashlib.sha256(
         b"".join(path.read_bytes() for path in built_from) + sys.version.encode()
     ).hexdigest()
