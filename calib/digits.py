@@ -67,6 +67,11 @@ def length(mm: float) -> str:
     return f"{1000.0 * mm:.3g} um"
 
 
+def turn(rad: float) -> str:
+    """An angle to three digits: ``400 mrad``, ``9.28 urad``."""
+    return f"{1e3 * rad:.3g} mrad" if abs(rad) >= 0.9995e-3 else f"{1e6 * rad:.3g} urad"
+
+
 def rounded(value: float | None, sigma: float | None) -> str:
     """A value alone, to the second digit of its uncertainty."""
     return Digits.of(sigma, value).text(value)

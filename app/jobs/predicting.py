@@ -16,6 +16,7 @@ from app.jobs.chosen_runs import File, Runs, names_of, path_of
 from app.jobs.fitting import BadReadingEntry, RemarkEntry
 from app.jobs.record import Record, Report
 from calib.arrays import Array, BoolArray
+from calib.digits import length, turn
 from calib.identify.predicting import Prediction, shift_of_frames
 from calib.identify.predicting import predict as predicted
 from calib.model.prediction import Model
@@ -282,7 +283,8 @@ def _frame_words(found: Prediction) -> Sequence[str]:
     if log_p > math.log(DOUBTFUL):
         return []
     told = [
-        f"{np.linalg.norm(step[:3, k]):.3g} mm and {1000 * np.linalg.norm(step[3:, k]):.2g} mrad"
+        f"{length(float(np.linalg.norm(step[:3, k])))} and "
+        f"{turn(float(np.linalg.norm(step[3:, k])))}"
         for k in range(step.shape[1])
     ]
     return [

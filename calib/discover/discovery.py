@@ -161,7 +161,8 @@ def discover_run(refit: Refitter, begin: tuple[str, ...] = ()) -> Discovery:
     """
     shown = tuple(name for name in refit.rows.known if name not in begin)
     stage = refit(begin)
-    if not shown and of_other_machines(stage):
+    each_run = any("@" in name for name in refit.effects)  # what changed is then asked
+    if not shown and not each_run and of_other_machines(stage):
         return Discovery((Revision(stage),), (), (), ())
     return discover(refit, begin, keep=(*begin, *shown), first=shown, forbids=_forbids)
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from calib.digits import length
+from calib import digits
 from calib.identify.fitting import Fit
 from calib.mechanism.rigid import exponential
 from calib.runs.remark import Remark
@@ -33,9 +33,5 @@ def as_fitted(remark: Remark, fitted: Fit) -> Remark:
     rotation, position = state.frame_rotation[:, :, 0], state.frame_position[:, 0]
     turned = rotation @ exponential(turn) @ rotation.T
     went = float(np.linalg.norm(position + rotation @ shift - turned @ position))
-    angle = float(np.linalg.norm(turn))
-    by = f"{1e3 * angle:.3g} mrad" if angle >= 1e-3 else f"{1e6 * angle:.3g} urad"
-    return replace(
-        remark,
-        says=f"{remark.says}. If it was the tracker, it went {length(went)} and turned by {by}",
-    )
+    by = f"{digits.length(went)} and turned by {digits.turn(float(np.linalg.norm(turn)))}"
+    return replace(remark, says=f"{remark.says}. If it was the tracker, it went {by}")

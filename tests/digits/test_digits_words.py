@@ -3,7 +3,7 @@
 import pytest
 
 from app.show.sizes import size_text
-from calib.digits import length
+from calib.digits import length, turn
 from calib.unknown import Choice, Moment, Unknown
 
 
@@ -20,6 +20,11 @@ from calib.unknown import Choice, Moment, Unknown
 )
 def test_a_length_has_the_unit_in_which_it_is_short(mm: float, told: str) -> None:
     assert length(mm) == told
+
+
+@pytest.mark.parametrize(("rad", "told"), [(0.4, "400 mrad"), (9.28e-6, "9.28 urad")])
+def test_so_has_an_angle(rad: float, told: str) -> None:
+    assert turn(rad) == told
 
 
 def test_a_choice_is_its_name_and_a_moment_says_in_which_run_it_is() -> None:
