@@ -53,7 +53,11 @@ class Digits:
 
 
 def plus_minus(value: float, sigma: float | None, unit: str = "", sign: str = "+-") -> str:
-    """A value with its standard uncertainty: ``0.000134 +- 0.000028 mm/N``, ``5.40 +- 0.48 s``."""
+    """A value with its standard uncertainty: ``0.000134 +- 0.000028 mm/N``, ``5.40 +- 0.48 s``.
+
+    A ratio, of unit 1, has none written.
+    """
+    unit = "" if unit == "1" else unit
     digits = Digits.of(sigma, value)
     if sigma is None:
         return f"{digits.text(value)} {unit}".rstrip()

@@ -191,6 +191,10 @@ class DiscoverFace(Face):
             self.toggle_class("-model")
 
 
+NAME = 14
+"""Signs of a step's name, where none is longer."""
+
+
 def stairs_text(search: "Search | None", room: int, most: int) -> Content:
     """The error after the last steps; a bar of ``room`` signs: noise, and what is left."""
     if search is None:
@@ -200,13 +204,17 @@ def stairs_text(search: "Search | None", room: int, most: int) -> Content:
     shown = search.stairs[-most:]
     top = max(stair.rms_um for stair in search.stairs)
     legend = " ░noise █left" if room > 10 else ""
-    lines = [Content.from_markup("[dim]$head[/]", head=f"{'RMS':>20} held out{legend}")]
+    # A name is worth more than the bar beside it.
+    more = min(max(0, *(len(stair.did) - NAME for stair in shown)), room)
+    name, room = NAME + more, room - more
+    head = f"{'RMS':>{name + 6}} held out{legend}"
+    lines = [Content.from_markup("[dim]$head[/]", head=head)]
     for number, stair in enumerate(shown):
-        line = f"{_cut(stair.did, 14):<14}{stair.rms_um:6.2f}{_um(stair.holdout_um)} "
+        line = f"{_cut(stair.did, name):<{name}}{stair.rms_um:6.2f}{_um(stair.holdout_um)} "
         last = number == len(shown) - 1
         lines.append(Content.assemble((line, "bold" if last else ""), bar(stair, top, room)))
     floor = shown[-1]
-    line = f"{'perfect':<14}{floor.floor_um:6.2f}{_um(floor.holdout_floor_um)}"
+    line = f"{'perfect':<{name}}{floor.floor_um:6.2f}{_um(floor.holdout_floor_um)}"
     lines.append(Content.assemble((line, "$ink-success")))
     return Content("\n").join(lines)
 
@@ -274,10 +282,14 @@ def found_text(view: "View | None") -> Content:
     lines = []
     for effect in view.effects:
         lines.append(Content.assemble((effect, "bold")))
-        for each in view.parameters:
-            if each["name"].startswith(f"{effect}."):
-                name = each["name"].removeprefix(f"{effect}.")
-                lines.append(Content(f"  {name:<10} {size_text(each, sign='±')}"))
+        stem = f"{effect}."
+        own = {
+            each["name"].removeprefix(stem): size_text(each, sign="±")
+            for each in view.parameters
+            if each["name"].startswith(stem)
+        }
+        longest = max(map(len, own), default=0)
+        lines += [Content(f"  {name:<{longest}} {size}") for name, size in own.items()]
     return Content("\n").join(lines)
 
 

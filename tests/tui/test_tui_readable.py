@@ -10,13 +10,15 @@ from rich.text import Text
 from textual.app import App, ComposeResult
 from textual.widgets import DataTable
 
+from app.files.machines import load_machine
 from app.session.events import GateChecked, WriteBackStage
 from app.tui.apply import gates_text, grouped, rows_of
-from app.tui.discover import largest_text
+from app.tui.discover import largest_text, stairs_text
 from app.tui.program import Workbench
 from app.tui.verify import running_text
 from app.tui.widgets.plots import MissPlot, Spaced
 from app.tui.widgets.tables import fill
+from calib.effects import catalogue
 
 
 def columns(bench: Workbench, table: str) -> tuple[int, int]:
@@ -135,3 +137,22 @@ async def test_the_latest_stage_of_a_write_back_is_in_sight(tmp_path: Path) -> N
         await pilot.pause(0.5)
         stages = bench.screen.query_one("#apply-stages")
         assert stages.scroll_offset.y == stages.max_scroll_y > 0
+
+
+NARROW = 37
+"""Signs of a line of the staircase at 80 columns."""
+
+
+def test_no_effect_has_its_name_cut_off_in_the_staircase_of_a_narrow_screen() -> None:
+    search = stream.searched()
+    for effect in catalogue(load_machine("tripod")):
+        named = replace(search, stairs=[replace(search.stairs[-1], did=f"+ {effect.id}")])
+        lines = str(stairs_text(named, 7, 5)).split("\n")
+        assert lines[1].startswith(f"+ {effect.id} ")
+        assert max(map(len, lines)) <= NARROW
+
+
+def test_a_ratio_has_no_unit_written_after_it() -> None:
+    one = {"name": "contact.leg2", "value": 2e-3, "sigma": 1e-4, "unit": "1"}
+    said = largest_text({"effect": "contact", "parameters": [one]}, ())
+    assert said == "leg2 0.00200 ± 0.00010"
