@@ -3,7 +3,7 @@
 A scan over periods has hundreds of trials, each as long as the readings. What is asked of them are
 products with few vectors; so columns that would fill the memory are made when a product is asked
 for and forgotten again, in blocks of a size that does not depend on how many readings there are
-but for one trial, which is the least. Products are the same in blocks and at once.
+but for some thirty columns, which are the least. Products are the same in blocks and at once.
 """
 
 from collections.abc import Callable, Iterator
@@ -15,8 +15,9 @@ from calib.arrays import Array
 
 HELD = 3_000_000
 """Numbers that all columns of one question may hold together (24 MB)."""
-BLOCK = 1_000_000
-"""Numbers in a block of trials, unless one trial alone has more."""
+BLOCK, ABREAST = 1_000_000, 32
+"""Numbers in a block of trials, unless so many columns have more: what is done reading by reading
+for all columns of a block together costs the same for one."""
 
 Make = Callable[[int, int], Array]
 """First trial, last trial + 1 -> their columns (t, k, R)."""
@@ -60,7 +61,8 @@ class Columns:
 
     def blocks(self) -> Iterator[tuple[slice, Array]]:
         """Trials and their columns (t, k, R), all of them, a few trials at a time."""
-        each = max(1, BLOCK // max(self.shape[1] * self.shape[2], 1))
+        wide, rows = max(self.shape[1], 1), max(self.shape[2], 1)
+        each = max(1, ABREAST // wide, BLOCK // (wide * rows))
         for first in range(0, self.shape[0], each):
             last = min(first + each, self.shape[0])
             yield slice(first, last), self._made(first, last)
