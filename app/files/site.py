@@ -3,18 +3,25 @@
 The format ``pkm-site/1`` is described in docs/site-file.md.
 """
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
 from app.devices import Role, kind_named, kind_names
-from app.files.device_settings import read_address, read_settings
 from app.files.machines import load_machine
 from app.files.record_details import FILES, RecordDetails, record_details
+from app.files.site_devices import (
+    FARTHEST_MM,
+    ControllerSite,
+    Hands,
+    TrackerSite,
+    read_controller,
+    read_hands,
+    read_tracker,
+)
 from app.files.site_gauge import GaugeSite, read_gauge
 from app.files.site_limits import Limits, read_limits
 from app.files.text import read_text
@@ -26,66 +33,10 @@ from calib.runs.sensing import Setup
 from calib.runs.setup import nests_of, planes_of
 from calib.toml_faults import Faults
 from calib.toml_table import TomlTable
-from drivers.kind import Takes
 
 FORMAT = "pkm-site/1"
-FARTHEST_MM = 1e9
 FASTEST = 1e6
 """No mock's clock runs faster."""
-
-
-@dataclass(frozen=True)
-class ControllerSite:
-    """Which motion controller it is; ``settings`` holds what its kind declares.
-
-    ``address`` names this very one: its channel or port. ``takes`` says what it is commanded
-    with (:class:`drivers.kind.Kind`). ``store`` is the folder of the host's
-    parameter sets where the host computes the motion; empty: the usual one.
-    """
-
-    kind: str
-    serial: str
-    settings: Mapping[str, Any]
-    address: str
-    takes: Takes = "parameters"
-    store: str = ""
-
-    @property
-    def hosted(self) -> bool:
-        """Whether the host computes the motion, with parameters of its own."""
-        return self.takes != "parameters"
-
-
-@dataclass(frozen=True)
-class TrackerSite:
-    """Which tracker it is, and roughly how it stands; ``settings`` are those of its kind.
-
-    ``frame`` is the base frame in the tracker frame (x, y, z mm; rx, ry, rz rad) and
-    ``frame_radius_mm`` how wrong a point computed with it may be.
-    """
-
-    kind: str
-    serial: str
-    settings: Mapping[str, Any]
-    address: str
-    model: str
-    reflector: str
-    frame: tuple[float, ...]
-    frame_radius_mm: float
-
-
-@dataclass(frozen=True)
-class Hands:
-    """Who carries SMRs, and how many there are.
-
-    ``base_smrs``: the reference nests on the base hold SMRs of their own that stay.
-    """
-
-    kind: str
-    host: str
-    port: int
-    smrs: int
-    base_smrs: bool
 
 
 @dataclass(frozen=True)
@@ -172,7 +123,7 @@ def site_of(top: TomlTable, source: str, folder: Path) -> Site:
     title = top.text("title", "")
     # How many actuators there are is known only of a machine that can be read.
     count = len(machine.actuators) if isinstance(machine, Machine) else None
-    controller = attempt(lambda: _controller(top.table("controller"), count, folder))
+    controller = attempt(lambda: read_controller(top.table("controller"), count, folder))
     tracker = gauge = None
     if by_gauge and top.has("tracker"):
         top.complain("a tracker and a gauge", "gauge", remedy="Name the one that is to measure")
@@ -180,8 +131,8 @@ def site_of(top: TomlTable, source: str, folder: Path) -> Site:
         own, places = setup, (platform_nests, base_nests)
         gauge = attempt(lambda: read_gauge(top.table("gauge"), own.planes, places, count, folder))
     else:
-        tracker = attempt(lambda: _tracker(top.table("tracker"), count, folder))
-    hands = attempt(lambda: _hands(top.table("hands", required=False)))
+        tracker = attempt(lambda: read_tracker(top.table("tracker"), count, folder))
+    hands = attempt(lambda: read_hands(top.table("hands", required=False)))
     limits = attempt(lambda: read_limits(top.table("limits", required=False)))
     clock_scale = attempt(lambda: _clock(top.table("clock", required=False)))
     offers = attempt(lambda: _offers(top.table("effects", required=False), folder))
@@ -272,51 +223,6 @@ def _check_nests(
     if both:
         name = min(both)
         raise table.wrong(f'nest "{name}" is on both', name, remedy="Give every nest its own name")
-
-
-def _controller(table: TomlTable, actuators: int | None, folder: Path) -> ControllerSite:
-    name = table.choice("kind", kind_names("controller"))
-    kind = kind_named("controller", name)
-    settings = read_settings(table, kind, actuators, folder)
-    serial = table.text("serial", "")
-    address = kind.address(settings)
-    site = ControllerSite(name, serial, settings, address, kind.takes)
-    if store := table.text("store", ""):
-        if not site.hosted:
-            table.complain(
-                f"a controller of the kind {name} keeps its parameters itself",
-                "store",
-                remedy="Leave store out",
-            )
-        site = replace(site, store=str((folder / store).resolve()))
-    table.end()
-    return site
-
-
-def _tracker(table: TomlTable, actuators: int | None, folder: Path) -> TrackerSite:
-    name = table.choice("kind", kind_names("tracker"))
-    kind = kind_named("tracker", name)
-    settings = read_settings(table, kind, actuators, folder)
-    site = TrackerSite(
-        kind=name,
-        serial=table.text("serial", ""),
-        settings=settings,
-        address=kind.address(settings),
-        model=table.text("model", "AT901-LR" if name == "emscon" else name),
-        reflector=table.text("reflector", ""),
-        frame=table.numbers("frame", 6, unit="mm, rad", most=FARTHEST_MM),
-        frame_radius_mm=table.number("frame_radius_mm", 20.0, unit="mm", above=0.0, most=math.inf),
-    )
-    table.end()
-    return site
-
-
-def _hands(table: TomlTable) -> Hands:
-    kind = table.choice("kind", ["operator", "mock"], "operator")
-    host, port = read_address(table, "control", 0) if kind == "mock" else ("", 0)
-    hands = Hands(kind, host, port, table.whole("smrs", 1, least=1), table.flag("base_smrs", True))
-    table.end()
-    return hands
 
 
 def _clock(table: TomlTable) -> float:

@@ -11,7 +11,8 @@ from session_mock import POSES, site_text
 
 from app.clock import Clock
 from app.files.pose_table import Pose
-from app.files.site import Hands, Site, parse_site
+from app.files.site import Site, parse_site
+from app.files.site_devices import Hands
 from app.files.site_limits import Limits
 from app.session.answered import expected_targets
 from app.session.plan import Plan
