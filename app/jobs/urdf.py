@@ -21,7 +21,8 @@ from app.files.urdf import (
 from app.files.urdf_chain import limits_of, plain, words_of
 from app.files.urdf_loops import loops_in_toml, loops_in_urdf
 from app.jobs.completing import completed
-from app.jobs.urdf_closed import Tree, closed_text, closed_urdf
+from app.jobs.urdf_closed import Tree, closed_text
+from app.jobs.urdf_loops_out import closed_urdf
 from calib.arrays import Array
 from calib.errors import BadInput
 from calib.mechanism.check import pose_in_file, require_sound
