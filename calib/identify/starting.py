@@ -19,6 +19,8 @@ NOWHERE = "are where a nest can be"
 """Said of a run of which too few readings stand where they can."""
 AT_REST = 0.1
 """How far the nests on the base may wander during a run and count as at rest, mm."""
+TOGETHER = 2000
+"""Readings that are weighed at once."""
 MOVED = ", moved as one with others: the tracker or the base was moved during the run"
 """Said of readings outside that fit one another; a run from there on is a run of its own."""
 
@@ -175,10 +177,12 @@ def slack_of(model: Model, linear: Linearised) -> Array:
     Six sigmas of what the tolerances can do, the alignment's share included, plus a millimetre
     for effects that nobody has modelled.
     """
+    sigma = model.machine.prior_sigma[model.free][: len(linear.jacobian), None, None]
     spread = np.zeros(model.rows.count)
-    for column, sigma in zip(linear.jacobian, model.machine.prior_sigma[model.free], strict=False):
-        spread += np.sum((sigma * model.rows.in_mm(column)) ** 2, axis=0)
-    spread = np.sqrt(spread)
+    for first in range(0, spread.size, TOGETHER):
+        part = slice(first, first + TOGETHER)
+        moved = model.rows.in_mm(sigma * linear.jacobian[: len(sigma), :, part], part)
+        spread[part] = np.sqrt(np.square(moved, out=moved).sum(axis=(0, 1)))
     variances = np.einsum("iin->in", model.rows.covariance)
     noise = np.sqrt(np.sum(np.where(model.rows.in_millimetres, variances, 0.0), axis=0))
     return np.asarray(1.0 + 6.0 * (np.maximum(spread, np.median(spread)) + noise))
