@@ -108,7 +108,7 @@ def kinematics() -> Iterator[Row]:
     many = (lambda: inverse(machine, task), lambda: forward(machine, extension))
     for what, one, batch, peer in zip(("inverse", "forward"), alone, many, peers, strict=True):
         yield Row(f"one pose alone, {what}", *both(one, 200), peer, peer_is)
-        old, new = both(batch, 20)
+        old, new = both(batch, 60)
         yield Row(f"{what} in batches, a pose", old / POSES, new / POSES, peer, peer_is)
     yield from derivatives()
 
@@ -118,7 +118,7 @@ def derivatives() -> Iterator[Row]:
     machine = load_machine("hexapod")
     chosen = sample_poses(machine, POSES, np.random.default_rng(1))
     at, task = chosen.configuration, np.ascontiguousarray(chosen.task)
-    old, new = both(lambda: inverse(machine, task), 20)
+    old, new = both(lambda: inverse(machine, task), 100)
     yield Row("hexapod: inverse in batches, a pose", old / POSES, new / POSES, None, "")
     closed = HexapodClosedForm(machine)
     legs = closed.forward(at.extension)
@@ -126,7 +126,7 @@ def derivatives() -> Iterator[Row]:
     ours = (lambda: forward(machine, at.extension), lambda: pose_jacobians(machine, at))
     theirs = (lambda: closed.forward(at.extension), lambda: closed.jacobian(legs))
     for what, work, peer in zip(("forward", "Jacobian"), ours, theirs, strict=True):
-        old, new = both(work, 20)
+        old, new = both(work, 60)
         yield Row(
             f"hexapod: {what} in batches, a pose", old / POSES, new / POSES,
             cpu(peer, 10) / POSES, "its closed form by hand in numpy",

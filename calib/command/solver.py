@@ -214,7 +214,7 @@ def _solved(
     if after is not None:
         grown = after.trend * (plain.extension - after.plain[:, -1:])
         begin = begin + (after.extension - after.plain)[:, -1:] + grown
-        near = after.standing.last(kept.size, -grown)
+        near = after.standing.last(kept.size).growing(-grown)
     extension = np.where(kept, begin, history.extension[:, -1:])
     passes = best = waited = 0
     while True:
@@ -235,6 +235,9 @@ def _solved(
         if good.all() or waited > PATIENCE:
             break
         step = _towards(identified, error, near) - near.drift
+        if after is not None:  # what effects add grows with it as it did
+            near = near.growing(-after.trend * np.where(np.isfinite(step), step, 0.0))
+            step = (1.0 + after.trend) * step
         moved = extension + np.where(kept, step, 0.0)
         extension = np.where(np.isfinite(moved), moved, extension)
     why = _why(identified, near, refused, good, steps)

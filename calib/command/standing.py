@@ -65,11 +65,8 @@ class Standpoint:
         """Whether the machine closes, and its effects agree with where it stands, (N,)."""
         return self.closed.converged & (self.unrest <= AGREED)
 
-    def last(self, count: int, grown: Array) -> "Standpoint":
-        """The last of its commands as where to begin ``count`` others nearby.
-
-        ``grown`` (n, count): by how much what its effects do to the extensions may have grown.
-        """
+    def last(self, count: int) -> "Standpoint":
+        """The last of its commands as where to begin ``count`` others nearby."""
         done = self._done
         parameters = None
         if done.parameters is not None:
@@ -78,11 +75,16 @@ class Standpoint:
             self,
             closed=self.closed.take(slice(self.closed.count - 1, self.closed.count)),
             _done=_Changes(
-                done.extension[:, -1:] + grown,
+                np.repeat(done.extension[:, -1:], count, axis=1),
                 parameters,
                 np.repeat(done.twist[:, -1:], count, axis=1),
             ),
         )
+
+    def growing(self, extension: Array) -> "Standpoint":
+        """The same as where to begin, if the effects change the extensions by (n, N) more."""
+        done = self._done
+        return replace(self, _done=replace(done, extension=done.extension + extension))
 
     @property
     def twists(self) -> Array:
