@@ -36,6 +36,8 @@ IN_QUESTION = 7.0
 """Candidates whose evidence is less than e^7 below the best are still in question."""
 CLEAR, SAME = 1e-3, 1e-6
 """p-value below which an addition is no chance; part of a signature that is rounding."""
+JOINED = 3
+"""Kinds of structure that compete for what is taken beside noise, those with the most evidence."""
 UNKNOWN_MARGIN = 10.0
 """Structure of unknown origin must beat the effects' evidence by e^10 to be preferred,"""
 UNKNOWN_SHARE = 0.1
@@ -108,15 +110,40 @@ def diagnose(
 
 
 def _structure(judged: Round, alpha: float) -> Joined | None:
-    """Significant structure with the most evidence, as columns."""
+    """Significant structure, as columns: of those with the most evidence the likeliest."""
     scores = judged.scores
     others = range(len(judged.effects), len(scores.candidates))
     called = [index for index in others if significant(judged.log_p(index), alpha)]
     if not called:
         return None
-    best = max(called, key=lambda index: observed(scores, index)[0])
-    name, evidence = scores.candidates[best].name, observed(scores, best)[0]
-    return Joined(name, evidence, *joining(scores, best))
+    called.sort(key=lambda index: -observed(scores, index)[0])
+    offered = [
+        Joined(scores.candidates[index].name, observed(scores, index)[0], *_joining(scores, index))
+        for index in called[:JOINED]
+    ]
+    price = float(np.log(scores.problem.residual.size))
+
+    def likelier(one: Joined) -> float:
+        fall = _estimate(scores, one.columns, one.precision)[1]
+        return fall - price * float(one.columns.shape[0])
+
+    return max(offered, key=likelier)
+
+
+def _joining(scores: Scores, index: int) -> tuple[Array, Array]:
+    """Columns and prior precision with which structure joins: a period that no trial quite is.
+
+    Trials are half an independent frequency apart: too far for what is slow and strong.
+    """
+    candidate = scores.candidates[index]
+    _, trial = best_hypothesis(scores, index)
+    if candidate.between is None or not candidate.trials[trial]:
+        return joining(scores, index)
+    period = _refined(scores, index, trial)
+    columns, precision = candidate.between(period), candidate.prior_precision
+    beta, _ = _estimate(scores, columns, precision)
+    low, high = (beta @ candidate.between(factor * period) for factor in (0.99, 1.01))
+    return np.vstack([columns, high - low]), np.append(precision, 1e-2)
 
 
 def _groups(found: Exploration, alpha: float) -> list[tuple[int, ...]]:

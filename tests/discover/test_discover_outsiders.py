@@ -170,6 +170,7 @@ def test_discover_outsiders_period_in_time_is_named(capsys, tmp_path, period):
     found = answer(capsys, "diagnose", tmp_path)
     assert found["unexplained"]["channels"][0] == "time_s"
     assert found["unexplained"]["periods"]["time_s"] == pytest.approx(period, rel=0.03)
+    assert found["noise"]["components"] == []
     told = re.findall(r"period of ([\d.]+) min", found["advice"])
     assert told
     assert [float(one) for one in told] == pytest.approx([period / 60.0] * len(told), rel=0.05)
