@@ -28,7 +28,7 @@ SEED = 20_260_801
 ASTRAY = 1e-3
 """Relative rise of a fit's cost, by one effect more, that is no rounding."""
 
-FAR_APART = 5.0
+FAR_APART = 10.0
 """RMS of several runs together, over that apart, that is another machine before it is an effect."""
 
 BEYOND_DOUBT = -14.0
@@ -170,13 +170,13 @@ def discover_run(refit: Refitter, begin: tuple[str, ...] = ()) -> Discovery:
 def of_other_machines(stage: RunStage) -> bool:
     """Whether runs are so far from sharing a geometry that effects would only hide it.
 
-    Each alone is explained, together they are worse by far, and no single effect mends half of it.
+    Each alone is explained, together they are worse by far, with any single effect more, too.
     """
     odds = runs_at_odds(stage.fit)
     if odds is None or odds.together_mm < FAR_APART * odds.apart_mm:
         return False
     best = stage.diagnosis.best
-    return best is None or stage.run.outlook(best).rms_mm > 0.5 * odds.together_mm
+    return best is None or stage.run.outlook(best).rms_mm > FAR_APART * odds.apart_mm
 
 
 def _forbids(stage: Stage, name: str) -> bool:
