@@ -154,7 +154,7 @@ class StepEntry(Record):
 
     ``p_value`` (family-wise), ``log_evidence`` (log Bayes factor against nothing) and ``rivals``
     (effects that this run cannot tell from it) are those of the effect when it was added; ``weak``:
-    such a p-value may well be chance.
+    such a p-value may well be chance. What the record itself shows (``record``) has none of them.
     """
 
     added: str | None
