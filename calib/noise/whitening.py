@@ -13,11 +13,12 @@ What hangs on how the readings were taken alone is laid out once for all sizes o
 steps themselves are in :mod:`calib.noise.filtering`.
 """
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
-from calib.arrays import Array, IntArray
+from calib.arrays import Array, BoolArray, IntArray
 from calib.noise.component import Noise, Taking
 from calib.noise.filtering import Filters, Layout, filters, innovations
 
@@ -43,7 +44,6 @@ class Whitening:
             root = taking.scatter.root(noise.scatter)
             self._own = np.ascontiguousarray(np.moveaxis(np.linalg.inv(root), 0, -1))
             own_log_det = 2.0 * float(np.sum(np.log(np.diagonal(root, axis1=1, axis2=2))))
-            taking = taking.corrected(self._own) if noise.visit > 0.0 else taking
         self._plain = noise.tau_s <= 0.0 and noise.visit <= 0.0
         self._layout: Layout | None = None
         self._chain: tuple[IntArray, Array] | None = None
@@ -57,6 +57,8 @@ class Whitening:
             self.log_det = 2.0 * float(held @ np.log(noise.scale * left))
         else:
             layout = _laid_out(taking, noise.tau_s > 0.0, noise.visit > 0.0)
+            if self._own is not None and noise.visit > 0.0:
+                layout = _corrected(layout, taking, self._own)
             self._layout = layout
             self._filters = _filters(taking, layout, noise)
             logs = np.log(self._filters.spread[layout.there])
@@ -120,12 +122,24 @@ def _laid_out(taking: Taking, ties: bool, visits: bool) -> Layout:
     first = 3 if ties else 0
     size = first + (taking.motions.shape[0] if visits else 0)
     seen = np.zeros((*there.shape, 3, size))
-    seen[..., :first] = np.eye(3)[:, :first]
+    seen[..., :first] = np.eye(3)[:, :first] * there[..., None, None]
     if visits:
-        motions = taking.motions.transpose(2, 1, 0)[reading]
-        seen[..., first:] = motions * (taking.visit[reading] >= 0)[..., None, None]
-    seen *= there[..., None, None]
+        seen[..., first:] = _moved(taking, reading, there)
     return Layout(reading, there, (visit >= 0) & (visit != before), seen)
+
+
+def _moved(taking: Taking, reading: IntArray, there: BoolArray) -> Array:
+    """How actuators that do not repeat move each reading of the sequences, (T, B, 3, n)."""
+    motions = taking.motions.transpose(2, 1, 0)[reading]
+    return np.asarray(motions * (there & (taking.visit[reading] >= 0))[..., None, None])
+
+
+def _corrected(layout: Layout, taking: Taking, inverse: Array) -> Layout:
+    """The same sequences of readings that are whitened by ``inverse`` (3, 3, A) once more."""
+    seen = layout.seen.copy()
+    first = seen.shape[3] - taking.motions.shape[0]
+    seen[..., first:] = _moved(taking.corrected(inverse), layout.reading, layout.there)
+    return replace(layout, seen=seen)
 
 
 def _filters(taking: Taking, layout: Layout, noise: Noise) -> Filters:
