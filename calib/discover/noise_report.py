@@ -78,21 +78,19 @@ def _says(fit: Fit, one: Component) -> str:
     if one.name == "visit":
         return _of_visits(fit, one)
     if one.name == "scale":
-        return (
-            f"readings scatter {plus_minus(one.value, one.sigma)} times as much as sx, sy, sz say"
-        )
+        return f"readings scatter {_size(one.value, one.sigma)} times as much as sx, sy, sz say"
     name, of = _named(one)
     if name == "added":
         return (
-            f"white noise of {plus_minus(one.value, one.sigma, _ADDED[one.name][1])} comes on top "
+            f"white noise of {_size(one.value, one.sigma, _ADDED[one.name][1])} comes on top "
             f"of what is stated of {of}"
         )
     if name == "range":
         return (
             "the scatter grows with range, beyond what is stated, by "
-            f"{plus_minus(one.value, one.sigma, 'um/m')} an axis"
+            f"{_size(one.value, one.sigma, 'um/m')} an axis"
         )
-    times = f"scatter {plus_minus(one.value, one.sigma)} times what is stated"
+    times = f"scatter {_size(one.value, one.sigma)} times what is stated"
     if one.name in (ALONG, ACROSS):
         return f"{of} readings {times}"
     return f"readings of the {of} {times}"
@@ -101,7 +99,7 @@ def _says(fit: Fit, one: Component) -> str:
 def _in_time(fit: Fit, one: Component) -> str:
     if one.name == "walk":
         return (
-            f"the noise wanders by {plus_minus(one.value, one.sigma)} sigma from one reading to "
+            f"the noise wanders by {_size(one.value, one.sigma)} sigma from one reading to "
             "the next, and does not come back within the run"
         )
     noise = fit.noise
@@ -118,7 +116,7 @@ def _of_visits(fit: Fit, one: Component) -> str:
     value, sigma = factor * size * one.value, factor * size * one.sigma
     return (
         "each visit of a pose errs as a whole, every actuator by "
-        f"{plus_minus(value, sigma, unit)}: "
+        f"{_size(value, sigma, unit)}: "
         "the machine repeats no better, or depends on the pose in a way that no column shows "
         "(poses that are visited twice tell)"
     )
@@ -126,5 +124,12 @@ def _of_visits(fit: Fit, one: Component) -> str:
 
 def _time(value: float, sigma: float) -> str:
     if value >= 120.0:
-        return plus_minus(value / 60.0, sigma / 60.0, "min")
-    return plus_minus(value, sigma, "s")
+        return _size(value / 60.0, sigma / 60.0, "min")
+    return _size(value, sigma, "s")
+
+
+def _size(value: float, sigma: float, unit: str = "") -> str:
+    """A value with its uncertainty; about so large where the readings do not bound it."""
+    if math.isfinite(sigma):
+        return plus_minus(value, sigma, unit)
+    return f"about {value:.2g} {unit}".rstrip()

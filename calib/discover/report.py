@@ -306,9 +306,11 @@ def _of_physics(
         )
     outlook = found.outlook(best)
     says = found.columns_of(best.name).effect.says
+    before, after = found.holdout.rms_mm, outlook.holdout.rms_mm
+    does = "falls" if after < before else "would not fall: it goes"
     text = (
-        f"Add {best.name} ({says}): the error on held-out poses falls from "
-        f"{1000 * found.holdout.rms_mm:.1f} to {1000 * outlook.holdout.rms_mm:.1f} um"
+        f"Add {best.name} ({says}): the error on held-out poses {does} from "
+        f"{1000 * before:.1f} to {1000 * after:.1f} um"
     )
     # A group of another effect is about a model that has this one already.
     own = [group for group in diagnosis.indistinguishable if group[0] == best.name]

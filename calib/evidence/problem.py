@@ -41,12 +41,16 @@ class LinearProblem:
         1 / sigma^2 of the priors; zero for unknowns without one (frames).
     live : (R,) bool, optional
         Components that are held, if not all; the others are zero throughout.
+    pull : (p,), optional
+        Lambda times the distance of the fitted unknowns from their priors' means. Where the fit has
+        settled it is J e, and taken so if it is not given.
     """
 
     residual: Array
     jacobian: Array
     prior_precision: Array
     live: BoolArray | None = None
+    pull: Array | None = None
 
     def __post_init__(self) -> None:
         p, rows = self.jacobian.shape
@@ -60,6 +64,11 @@ class LinearProblem:
     def rows(self) -> int:
         """Number of whitened components that are held."""
         return self.residual.size if self.live is None else int(self.live.sum())
+
+    @cached_property
+    def held_back(self) -> Array:
+        """What the priors pull with (p,): ``pull``, or J e."""
+        return self.jacobian @ self.residual if self.pull is None else self.pull
 
     @cached_property
     def _normal(self) -> Scaled:
@@ -115,9 +124,12 @@ class LinearProblem:
         projected = self.project(columns)
         weight = columns @ projected.T + np.diag(precision)
         beta = np.linalg.lstsq(weight, columns @ self.residual, rcond=1e-12)[0]
+        pushed = self._normal.half_solved(self.jacobian @ (columns.T @ beta))
+        moved = self._normal.half_solved_back(pushed)
         return LinearProblem(
             residual=self.residual - projected.T @ beta,
             jacobian=np.concatenate([self.jacobian, columns]),
             prior_precision=np.concatenate([self.prior_precision, precision]),
             live=self.live,
+            pull=np.concatenate([self.held_back - self.prior_precision * moved, precision * beta]),
         )

@@ -102,7 +102,9 @@ class Fit:
     @property
     def problem(self) -> LinearProblem:
         """The fit as a linear problem over its accepted readings."""
-        return LinearProblem(self.whitened, self.jacobian, self.prior_precision, self._live)
+        return LinearProblem(
+            self.whitened, self.jacobian, self.prior_precision, self._live, self._pull
+        )
 
     @property
     def as_stated(self) -> LinearProblem:
@@ -110,7 +112,11 @@ class Fit:
         kept = self.accepted
         jacobian = self.linear.jacobian[:, :, kept].reshape(self.prior_precision.size, -1)
         residual = self.linear.whitened[:, kept].reshape(-1)
-        return LinearProblem(residual, jacobian, self.prior_precision, self._live)
+        return LinearProblem(residual, jacobian, self.prior_precision, self._live, self._pull)
+
+    @property
+    def _pull(self) -> Array:
+        return np.asarray(self.prior_precision * self.model.deviation(self.linear.state))
 
     @property
     def _live(self) -> BoolArray | None:

@@ -19,6 +19,7 @@ from calib.evidence.problem import LinearProblem
 from calib.noise.component import WHITE, Noise, Taking
 from calib.noise.likelihood import Likelihood, spread
 from calib.noise.scatter import tails, uneven
+from calib.noise.score import promising
 
 DEMANDED = 1.5
 """Rise of the log likelihood from which a component counts in judging what else is missing."""
@@ -36,6 +37,8 @@ TIED = (*FADING, *WANDERING)
 """One or the other."""
 PARTS = (*TIED, "visit", "scale")
 SAID = {"successive": "correlated", "walk-by-row": "walk"}
+CLOSEST = 2
+"""Components for which all sizes are found together, of those that would join: the likeliest."""
 POINTED, TRIED = 2.5, 2
 """Standard deviations of the score from which a component of scatter is tried; how many at most."""
 
@@ -85,9 +88,8 @@ def estimate(problem: LinearProblem, taking: Taking, *, least: float = DEMANDED)
     bar = _Bar(likelihood, taking, least)
     now = white = _Sizes((), (), likelihood.of(WHITE))
     gains: dict[str, float] = {}
-    left = [part for part in PARTS if part != "visit" or np.any(taking.visit >= 0)]
-    if not taking.alike:
-        left = [part for part in left if part not in TIED]
+    found = promising(*likelihood.left(WHITE), taking)
+    left = [part for part in PARTS if ("time" if part in TIED else part) in found]
     while True:
         fading = [part for part in left if part not in WANDERING]
         offers = {part: _joined(likelihood, now, part) for part in fading}
@@ -95,6 +97,9 @@ def estimate(problem: LinearProblem, taking: Taking, *, least: float = DEMANDED)
             offers |= {part: _joined(likelihood, now, part) for part in WANDERING}
         plain = tuple(offers)
         offers |= {part: _joined(likelihood, now, part) for part in _pointed(likelihood, now, bar)}
+        if now.parts:
+            first = sorted(offers, key=lambda part: offers[part].value + bar.price(part))
+            offers |= {part: _settled(likelihood, offers[part]) for part in first[:CLOSEST]}
         rise = {part: now.value - offer.value for part, offer in offers.items()}
         over = {
             part: rise[part] - bar.price(part)
@@ -108,7 +113,7 @@ def estimate(problem: LinearProblem, taking: Taking, *, least: float = DEMANDED)
         taken = TIED if best in TIED else (best,)
         left = [part for part in plain if part not in taken and rise[part] > FAINT]
     if set(FADING) & set(now.parts):
-        wider = _joined(likelihood, now, "share")
+        wider = _settled(likelihood, _joined(likelihood, now, "share"))
         now = wider if now.value - wider.value > SHARED else now
     now = _pruned(likelihood, now, bar)
     if not now.parts:
@@ -124,7 +129,7 @@ def points_to_scatter(problem: LinearProblem, taking: Taking) -> float:
     likelihood = Likelihood(problem, taking)
     if not likelihood.uneven:
         return 1.0
-    far = uneven(*likelihood.left(WHITE), taking.scatter, likelihood.uneven)
+    far = uneven(*likelihood.left(WHITE), taking.scatter, likelihood.uneven, taking.live)
     return min(1.0, far.size * math.erfc(float(np.max(np.abs(far))) / math.sqrt(2.0)))
 
 
@@ -174,7 +179,7 @@ def _pointed(likelihood: Likelihood, now: "_Sizes", bar: _Bar) -> list[str]:
         return []
     scatter = likelihood.taking.scatter
     residual, absorbed = likelihood.left(likelihood.noise(now.parts, now.logs))
-    far = uneven(residual, absorbed, scatter, names)
+    far = uneven(residual, absorbed, scatter, names, likelihood.taking.live)
     told = [
         float(one) if scatter.is_added(name) else abs(float(one))
         for name, one in zip(names, far, strict=True)
@@ -206,7 +211,7 @@ class _Sizes:
 
 
 def _joined(likelihood: Likelihood, now: _Sizes, part: str) -> _Sizes:
-    """One component more, all at their most likely sizes."""
+    """One component more at its most likely size, the others as they are."""
     parts = (*now.parts, part)
     low, high = likelihood.low[part], likelihood.high[part]
     grid = np.linspace(low, high, 6)
@@ -220,10 +225,7 @@ def _joined(likelihood: Likelihood, now: _Sizes, part: str) -> _Sizes:
         method="bounded",
         options={"xatol": 0.04, "maxiter": 9},
     )
-    alone = _Sizes(parts, (*now.logs, float(found.x)), float(found.fun))
-    if not now.parts or now.value - alone.value < FAINT:
-        return alone
-    return _settled(likelihood, alone)
+    return _Sizes(parts, (*now.logs, float(found.x)), float(found.fun))
 
 
 def _settled(likelihood: Likelihood, near: _Sizes) -> _Sizes:

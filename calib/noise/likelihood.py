@@ -7,7 +7,7 @@ the fit and a covariance C of the noise, the fitted unknowns integrated out (Pat
     -2 log L = log det C + log det (J C^-1 J^T + Lambda) + min over d of
                |C^-1/2 (e - J^T d)|^2 + (D + d)^T Lambda (D + d)
 
-where Lambda D = J e at the optimum of the fit.
+where D is how far the fit is from the priors' means (Lambda D = J e at its optimum).
 """
 
 import math
@@ -35,7 +35,7 @@ class Likelihood:
         self._residual = problem.residual.reshape(1, 3, -1)
         self._jacobian = problem.jacobian.reshape(problem.jacobian.shape[0], 3, -1)
         self._precision = problem.prior_precision
-        self._pull = problem.jacobian @ problem.residual
+        self._pull = problem.held_back
         self.taking = taking
         shortest = np.log(0.2 * taking.usual_gap_s)
         self.low = {

@@ -88,13 +88,26 @@ class Scatter:
                 total = total + size**2 * self.added[name]
         return np.asarray(total)
 
-    def root(self, sizes: Sizes) -> Array:
-        """Lower triangular factors (A, 3, 3) of M."""
-        factors = np.linalg.cholesky(np.moveaxis(self.covariance(sizes), -1, 0))
+    def root(self, sizes: Sizes, live: BoolArray | None = None) -> Array:
+        """Lower triangular factors (A, 3, 3) of M, of components (3, A) that are held alone."""
+        factors = np.linalg.cholesky(np.moveaxis(of_held(self.covariance(sizes), live), -1, 0))
         return np.asarray(factors, dtype=np.float64)
 
 
-def uneven(residual: Array, absorbed: Array, scatter: Scatter, names: Sequence[str]) -> Array:
+def of_held(blocks: Array, live: BoolArray | None, beside: float = 1.0) -> Array:
+    """Blocks (3, 3, A) of the components that are held; ``beside`` on the diagonal for others."""
+    if live is None:
+        return blocks
+    return np.asarray(np.where(live[:, None] & live, blocks, beside * np.eye(3)[:, :, None]))
+
+
+def uneven(
+    residual: Array,
+    absorbed: Array,
+    scatter: Scatter,
+    names: Sequence[str],
+    live: BoolArray | None = None,
+) -> Array:
     """How far (k,) the scatter of a fit hangs on each component, in standard deviations.
 
     The score test of heteroscedasticity, freed of the overall scale and studentised, so that heavy
@@ -107,8 +120,11 @@ def uneven(residual: Array, absorbed: Array, scatter: Scatter, names: Sequence[s
         Residuals, made white by the noise so far.
     absorbed : (p, 3, A)
         G of the same readings (see :class:`calib.evidence.problem.LinearProblem`).
+    live : (3, A) bool, optional
+        Components that are held, if not all.
     """
-    left = np.eye(3)[:, :, None] - np.einsum("pin,pjn->ijn", absorbed, absorbed)
+    whole = np.eye(3)[:, :, None] - np.einsum("pin,pjn->ijn", absorbed, absorbed)
+    left = of_held(whole, live, beside=0.0)
     freedom = float(np.einsum("iin->", left))
     square = np.sum(residual**2, axis=0)
     if freedom <= 0.0 or not square.any():

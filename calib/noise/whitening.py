@@ -41,7 +41,7 @@ class Whitening:
         self._own: Array | None = None
         own_log_det = 0.0
         if noise.scatter:
-            root = taking.scatter.root(noise.scatter)
+            root = taking.scatter.root(noise.scatter, taking.live)
             self._own = np.ascontiguousarray(np.moveaxis(np.linalg.inv(root), 0, -1))
             own_log_det = 2.0 * float(np.sum(np.log(np.diagonal(root, axis1=1, axis2=2))))
         self._plain = noise.tau_s <= 0.0 and noise.visit <= 0.0

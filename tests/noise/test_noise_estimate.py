@@ -5,6 +5,8 @@ import pytest
 
 from calib.evidence import LinearProblem
 from calib.noise import Noise, Taking, estimate
+from calib.noise.component import WHITE
+from calib.noise.likelihood import Likelihood
 
 VISITS, NESTS, UNKNOWNS = 60, 3, 25
 
@@ -42,6 +44,36 @@ def test_noise_is_found_back_with_its_size(noise, name, value):
     assert [one.name for one in found.components if one.p_value < 1e-3] == [name]
     assert abs(first.value - value) < 4.0 * first.sigma
     assert first.sigma < 0.3 * value
+
+
+def test_noise_does_not_hang_on_where_a_fit_has_stopped():
+    """With loose priors a gradient that is small for the readings is large for the priors."""
+    rng = np.random.default_rng(4)
+    whole, taken = lab(Noise(scale=1.3), rng)
+    loose = np.full(UNKNOWNS, 1e-4)
+    moved = 0.05 * rng.standard_normal(UNKNOWNS) / np.sqrt(np.sum(whole.jacobian**2, axis=1))
+    here = LinearProblem(whole.residual, whole.jacobian, loose, pull=np.zeros(UNKNOWNS))
+    there = LinearProblem(
+        whole.residual - moved @ whole.jacobian, whole.jacobian, loose, pull=loose * moved
+    )
+    for noise in (Noise(visit=0.5), Noise(tau_s=500.0, scale=30.0), Noise(scale=20.0, visit=10.0)):
+        rises = [Likelihood(one, taken).of(noise) - Likelihood(one, taken).of(WHITE)
+                 for one in (here, there)]  # fmt: skip
+        assert rises[1] == pytest.approx(rises[0], rel=1e-9)
+
+
+def test_what_priors_pull_with_goes_along_when_columns_join():
+    rng = np.random.default_rng(5)
+    whole, _ = lab(Noise(), rng)
+    stiff = np.full(UNKNOWNS, 40.0)
+    normal = whole.jacobian @ whole.jacobian.T + np.diag(stiff)
+    read = whole.residual + rng.standard_normal(UNKNOWNS) @ whole.jacobian
+    settled = np.linalg.solve(normal, whole.jacobian @ read)
+    fit = LinearProblem(
+        read - settled @ whole.jacobian, whole.jacobian, stiff, pull=stiff * settled
+    )
+    larger = fit.with_columns(rng.standard_normal((3, read.size)), np.full(3, 7.0))
+    np.testing.assert_allclose(larger.held_back, larger.jacobian @ larger.residual, atol=1e-9)
 
 
 def test_white_noise_is_taken_as_stated():

@@ -3,6 +3,8 @@
 A fit with some unknowns to readings of four nests a visit; sigmas, ranges and beams differ.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -122,6 +124,23 @@ def test_whitened_columns_have_the_inner_products_of_the_inverse_covariance(nois
     white, flat = whitening.apply(columns).reshape(4, -1), columns.reshape(4, -1)
     np.testing.assert_allclose(white @ white.T, flat @ np.linalg.solve(whole, flat.T), atol=1e-9)
     assert whitening.log_det == pytest.approx(np.linalg.slogdet(whole)[1], abs=1e-9)
+
+
+def test_components_that_a_reading_does_not_hold_count_for_nothing() -> None:
+    """Heights alone, their nests or the beam's direction scattering otherwise."""
+    rng = np.random.default_rng(9)
+    whole, noise = taken(rng), Noise(scatter=(("nest 2", 0.6), ("along", 1.8)), scale=1.1)
+    live = np.ones((3, whole.run.size), dtype=bool)
+    live[:2, whole.run.size // 2 :] = False
+    some = replace(whole, live=live, motions=whole.motions * live)
+    held = live.reshape(-1)
+    covariance = dense(whole, noise)[np.ix_(held, held)]
+    columns = rng.standard_normal((4, 3, whole.run.size)) * live
+    whitening = Whitening(some, noise)
+    white, flat = whitening.apply(columns).reshape(4, -1), columns.reshape(4, -1)[:, held]
+    inner = flat @ np.linalg.solve(covariance, flat.T)
+    np.testing.assert_allclose(white @ white.T, inner, atol=1e-8)
+    assert whitening.log_det == pytest.approx(np.linalg.slogdet(covariance)[1], abs=1e-8)
 
 
 def dense(taking: Taking, noise: Noise) -> np.ndarray:
