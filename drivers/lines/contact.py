@@ -1,14 +1,12 @@
 """A probe that touches or does not: what its lines say, one question at a time."""
 
 import re
-from collections.abc import Callable
 
-from drivers.errors import DeviceError, LinkError, NoNumber
-from drivers.interface import Alarm, GaugeCan, GaugeReading, GaugeState, Identity
-from drivers.lines.listener import Listener
+from drivers.errors import DeviceError
+from drivers.interface import GaugeCan, GaugeReading, Identity
+from drivers.lines.heard import Heard
 from drivers.lines.patience import LONGEST
 from drivers.lines.source import Source
-from drivers.stopping import stopped
 
 TOUCHES, OPEN = 1.0, 0.0
 
@@ -41,7 +39,7 @@ class ContactPattern:
         return TOUCHES if touches else OPEN
 
 
-class ContactProbe:
+class ContactProbe(Heard[GaugeReading]):
     """A touch-trigger probe or an electric contact (a :class:`drivers.interface.Gauge`).
 
     ``ask`` is sent before each reading; where it is empty the probe speaks by itself, and the
@@ -53,24 +51,8 @@ class ContactProbe:
     ) -> None:
         self.identity = Identity("contact")
         self.can = GaugeCan(contacts=True)
-        self._pattern, self._ask, self._device = pattern, ask, device
-        self._last = ""
-        self._lines: Listener[GaugeReading] = Listener(
-            source, self._read, silence_s, not ask, device
-        )
-
-    def on_alarm(self, callback: Callable[[Alarm], None]) -> None:
-        """Call ``callback`` for everything said unasked."""
-        self._lines.on_alarm(callback)
-
-    def check(self) -> None:
-        """Raise the fault that is standing."""
-        self._lines.check()
-
-    async def state(self) -> GaugeState:
-        """Whether its last line said one of both."""
-        self.check()
-        return GaugeState(self._pattern.read(self._last) is not None, self._last)
+        self._values, self._ask = pattern, ask
+        super().__init__(source, pattern, silence_s, not ask, device)
 
     async def read(self, dwell_s: float) -> GaugeReading:
         """Whether it touches now: :data:`TOUCHES` or :data:`OPEN`; a dwell makes no difference.
@@ -85,24 +67,11 @@ class ContactProbe:
             await self._lines.ask(self._ask)
             return await self._lines.next(heard)
 
-    async def stop(self) -> None:
-        """End a reading that is waited for."""
-        self._lines.tell(stopped(LinkError, self._device))
-
-    async def close(self) -> None:
-        """Release the link; never raises."""
-        await self._lines.close()
-
-    def _read(self, line: str) -> "GaugeReading | DeviceError | None":
-        if self._pattern.ignores(line):
-            return None
-        self._last = line.strip()
-        value = self._pattern.read(line)
+    def _said(self, line: str) -> "GaugeReading | DeviceError":
+        value = self._values.read(line)
         if value is not None:
             return GaugeReading(value, self._last)
-        shown = self._last if len(self._last) <= 60 else f"{self._last[:57]}..."
-        return NoNumber(
-            f"the line {shown!r} says neither that it touches nor that it does not",
-            device=self._device,
-            remedy="See touches, open and ignore in the site file, and the cable",
-        )
+        return self._nothing_in(
+            line, "says neither that it touches nor that it does not",
+            "See touches, open and ignore in the site file, and the cable",
+        )  # fmt: skip

@@ -2,15 +2,13 @@
 
 import asyncio
 import statistics
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.errors import DeviceError, LinkError, NoNumber, NotReady
-from drivers.interface import Alarm, GaugeCan, GaugeReading, GaugeState, Identity
-from drivers.lines.listener import Listener
+from drivers.interface import Alarm, GaugeCan, GaugeReading, Identity
+from drivers.lines.heard import Heard
 from drivers.lines.number import Number, NumberPattern
 from drivers.lines.source import Source
-from drivers.stopping import stopped
 
 LEAST_SAMPLES = 3
 """Lines of a stream that make a dwell at least."""
@@ -40,7 +38,7 @@ class GaugeSettings:
     silence_s: float
 
 
-class LineGauge:
+class LineGauge(Heard[Number]):
     """An instrument of one number that sends lines (a :class:`drivers.interface.Gauge`)."""
 
     def __init__(
@@ -50,12 +48,9 @@ class LineGauge:
         self.identity = Identity("lines")
         self._stream = settings.each == "sample"
         self.can = GaugeCan(repeats=settings.each != "key")
-        self._pattern, self._settings = pattern, settings
-        self._device, self._scale = device, time_scale
-        self._last, self._unit = "", ""
-        self._lines: Listener[Number] = Listener(
-            source, self._read, settings.silence_s, self._stream, device
-        )
+        self._numbers, self._settings = pattern, settings
+        self._scale, self._unit = time_scale, ""
+        super().__init__(source, pattern, settings.silence_s, self._stream, device)
 
     async def first_line(self) -> None:
         """Wait for a stream to begin; raises Silence, LinkLost."""
@@ -64,19 +59,6 @@ class LineGauge:
                 said = await heard.get()
             if isinstance(said, LinkError):
                 raise said
-
-    def on_alarm(self, callback: Callable[[Alarm], None]) -> None:
-        """Call ``callback`` for everything said unasked."""
-        self._lines.on_alarm(callback)
-
-    def check(self) -> None:
-        """Raise the fault that is standing."""
-        self._lines.check()
-
-    async def state(self) -> GaugeState:
-        """Whether its last line held a number."""
-        self.check()
-        return GaugeState(self._pattern.read(self._last) is not None, self._last)
 
     async def read(self, dwell_s: float) -> GaugeReading:
         """The mean of the lines of a dwell, the answer to a question, or the next line.
@@ -121,22 +103,13 @@ class LineGauge:
             )
         return GaugeReading(statistics.fmean(one.value for one in samples), samples[-1].line)
 
-    async def stop(self) -> None:
-        """End a reading that is waited for."""
-        self._lines.tell(stopped(LinkError, self._device))
-
-    async def close(self) -> None:
-        """Release the link; never raises."""
-        await self._lines.close()
-
-    def _read(self, line: str) -> "Number | DeviceError | None":
-        """What a line says: a number, that there was none, or nothing."""
-        if self._pattern.ignores(line):
-            return None
-        self._last = line.strip()
-        number = self._pattern.read(line)
+    def _said(self, line: str) -> "Number | DeviceError":
+        number = self._numbers.read(line)
         if number is None:
-            return self._none_in(line)
+            return self._nothing_in(
+                line, "holds no number",
+                "It is out of its range, or pattern or unit in the site file does not fit",
+            )  # fmt: skip
         if self._unit and number.unit != self._unit:
             self._lines.say(
                 Alarm(
@@ -146,11 +119,3 @@ class LineGauge:
             )  # fmt: skip
         self._unit = number.unit
         return number
-
-    def _none_in(self, line: str) -> NoNumber:
-        shown = line.strip() if len(line) <= 60 else f"{line[:57]}..."
-        return NoNumber(
-            f"the line {shown!r} holds no number",
-            device=self._device,
-            remedy="It is out of its range, or pattern or unit in the site file does not fit",
-        )
