@@ -90,7 +90,7 @@ class Connected:
 
 @pytest.fixture
 async def connected(station: Station) -> AsyncIterator[Connected]:
-    controller = await CanopenController.connect("slcan", station.channel, silence_s=3.0)
+    controller = await CanopenController.connect("slcan", station.channel, silence_s=1.2)
     alarms: list[Alarm] = []
     controller.on_alarm(alarms.append)
     yield Connected(controller, alarms)
