@@ -65,6 +65,8 @@ LINES_SIGMA_MM = 0.006
 STATION_LIMITS = {"base_fit_mm": 0.6, "drift_mm": 0.8, "two_face_mm": 1.5}
 """What is normal with a total station, whose readings are good to 0.3 mm."""
 FRAME_ERROR_MM, FRAME_ERROR_RAD = 3.0, 0.003
+PATIENCE_S = 2.5
+"""Silence of a mock controller that is a fault: on a busy computer its heartbeats come late."""
 
 
 class MockStation:
@@ -173,7 +175,7 @@ class MockStation:
         eds = {"eds": str(self.own.eds)} if self.own else {}
         return {
             "kind": "canopen", "interface": "slcan", "channel": self.channel,
-            "node": CONTROLLER_NODE, **eds,
+            "node": CONTROLLER_NODE, "silence_s": PATIENCE_S, **eds,
         }  # fmt: skip
 
     def _tracker_site(self) -> dict[str, Any]:
