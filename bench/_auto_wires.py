@@ -32,6 +32,7 @@ from bench._auto_worlds import (
     HOURS,
     MACHINE,
     OF_THE_TRACKER,
+    QUIET_MM,
     Came,
     World,
     hidden_in,
@@ -45,8 +46,6 @@ from mocks.simulate.run import simulate
 
 SCALE, TAU_S = 600.0, 30.0
 """Machine seconds in a second; how slow the tracker's noise is."""
-QUIET_MM = 5e-5
-"""Noise of the readings that tell a model's true error."""
 DEADLINE_S = 2000.0
 """Of one call of the program."""
 

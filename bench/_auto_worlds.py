@@ -9,6 +9,8 @@ from bench._blind_cases import Case, build, drawn_on
 
 MACHINE, FIXED, SIZE = "hexapod", 40, 2.0
 HOURS = 6.0
+QUIET_MM = 5e-5
+"""Noise of the readings that tell a model's true error."""
 CORRELATED, SLOW = "ar:0.3", "slow"
 OF_ONE_RUN = ("frame-shift", "actuator-step", "nest-step", "warm-up")
 """Events of one run: a world of several runs cannot hold them alike."""

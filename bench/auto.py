@@ -46,6 +46,7 @@ from bench._auto_worlds import (
     HOURS,
     MACHINE,
     OF_THE_TRACKER,
+    QUIET_MM,
     Came,
     World,
     draw,
@@ -62,8 +63,6 @@ from mocks.simulate.plan import Profile, RunPlan
 from mocks.simulate.run import simulate
 
 MINUTES_A_POSE = 2.0
-QUIET_MM = 5e-5
-"""Noise of the readings that tell the true error."""
 
 
 class SimulatedLaboratory:

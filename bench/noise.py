@@ -98,7 +98,10 @@ def clean(case: Case, condition: str) -> Line:
     return Line(
         "clean", condition, case.seed, (named.name,) if named else (),
         named is None and not first.diagnosis.adequate,
-        tuple(f"{one.name} {one.value:.3g} p {one.p_value:.1g}" for one in last.noise.components),
+        tuple(
+            f"{one.name} {one.value:.3g} p {one.p_value:.1g}"
+            for one in last.fit.components_of_noise
+        ),
         int(np.sum(np.abs(pulls) < 1.0)), len(pulls),
     )  # fmt: skip
 

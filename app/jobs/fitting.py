@@ -45,8 +45,7 @@ class RemarkEntry(Record):
     """A hypothesis about the record itself, said before any physics.
 
     ``lines`` of ``points.csv`` as (first, last); ``done`` about it for the analysis, ``remedy`` in
-    the files. Where it is not
-    ``settled`` the answer is the best point that its ``steps`` came to.
+    the files. Where it is not ``settled``, no model is called adequate.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """Diagnosis of a fitted run: which effect is missing, how large, and what adding it would bring."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +16,7 @@ from calib.identify.fitting import Fit
 from calib.identify.holdout import HoldOut, hold_out, hold_out_of
 from calib.identify.signatures import EffectColumns, effect_columns
 from calib.model.columns import whitened_columns
-from calib.noise import Found, Whitening
+from calib.noise import Whitening
 from calib.scaled import Scaled, normal_matrix
 from calib.unknown import Estimate, estimates_of, linear_among
 
@@ -38,16 +38,12 @@ class RunDiagnosis:
     """A fit, what is missing from it, and the signatures of the candidates.
 
     ``unavailable`` says why some effects of the catalogue cannot be seen in these readings.
-    ``noise`` is what the fit counts with, ``inflation`` the ratio of its uncertainties to those of
-    independent readings.
     """
 
     fit: Fit
     diagnosis: Diagnosis
     effects: tuple[EffectColumns, ...]
     unavailable: dict[str, str]
-    noise: Found = field(default_factory=Found)
-    inflation: float = 1.0
 
     @cached_property
     def holdout(self) -> HoldOut:

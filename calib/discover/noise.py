@@ -9,7 +9,6 @@ against noise by its evidence: where it says more than noise would, noise is wha
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -60,7 +59,6 @@ def judge(fit: Fit, catalogue: Sequence[Effect], seed: int) -> RunDiagnosis:
         noisy = with_noise(fit, found.noise, found.components)
         answer.diagnosis.scores.release()
         answer = diagnose_fit(noisy, catalogue, np.random.default_rng(seed))
-        answer = replace(answer, noise=found, inflation=noisy.inflation)
         still = {one.name for one in answer.diagnosis.joined}
         left = tuple(one for one in kept if one.name in still)
         if len(left) == len(kept):

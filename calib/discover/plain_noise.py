@@ -33,7 +33,7 @@ def with_own_noise(fit: Fit, catalogue: Callable[[], Sequence[Effect]]) -> Fit:
     from calib.discover.noise import judge  # a fit goes without
 
     answer = judge(fit, catalogue(), SEED)
-    clear = any(one.p_value < CLEAR for one in answer.noise.components)
+    clear = any(one.p_value < CLEAR for one in answer.fit.components_of_noise)
     return answer.fit if clear else fit
 
 

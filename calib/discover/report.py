@@ -257,7 +257,7 @@ def _of_physics(
         named = "one pose" if poses == 1 else f"{poses} poses"
         excluded += f" With {named} only large effects would show: measure more."
     told = noise_words(found.fit)
-    kinds = {one.name for one in found.noise.components}
+    kinds = {one.name for one in found.fit.components_of_noise}
     scatter = "" if told and "scale" not in kinds else untrue_uncertainties(found.fit)
     if scatter and kinds <= {"scale"}:
         told = ""  # it is the same in other words

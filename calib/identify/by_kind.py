@@ -8,7 +8,7 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray, parts_of
 from calib.identify.fitting import Fit
-from calib.identify.taking import noise_covariance
+from calib.identify.taking import noise_covariance, noise_variances
 from calib.runs.sensed import kind_words
 
 
@@ -77,11 +77,8 @@ def _of_kind(fit: Fit, name: str, which: BoolArray, *, angular: bool) -> OfKind:
     rows, linear = fit.model.rows, fit.linear
     live = rows.live[:, which]
     told = live if angular else rows.in_millimetres[:, which]
-    root = rows.unwhitener[:, :, which]
     own = noise_covariance(linear, fit.noise, which)
-    noise = np.einsum("ijn,ijn->in", root, root) * fit.noise.scale**2
-    if fit.noise.scatter:
-        noise = np.einsum("ijn,jkn,ikn->in", root, own, root)
+    noise = noise_variances(linear, fit.noise, which)
     expected = noise - _variance(fit, which, rows.unwhitener)
     leverage = _variance(fit, which)
     perfect = float(np.sum((np.einsum("iin->in", own) - leverage)[live]))

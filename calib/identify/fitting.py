@@ -12,7 +12,7 @@ from calib.evidence.problem import LinearProblem
 from calib.identify.optimum import optimise
 from calib.identify.readings import MASKED, BadReading, strays
 from calib.identify.starting import bad_reading, begin
-from calib.identify.taking import noise_covariance, taken
+from calib.identify.taking import noise_variances, taken
 from calib.mechanism.rigid import euler_rates, to_euler
 from calib.model.prediction import Model
 from calib.model.state import Linearised, State
@@ -217,15 +217,8 @@ class Fit:
 def noise_variance(fit: Fit, which: BoolArray) -> float:
     """Sum over readings of the variance of their noise, whatever they share of it, mm^2."""
     rows, noise = fit.model.rows, fit.noise
-    told = rows.in_millimetres[:, which]
-    if noise.scatter:
-        root = rows.unwhitener[:, :, which]
-        own = noise_covariance(fit.linear, noise, which)
-        variances = np.einsum("ijn,jkn,ikn->in", root, own, root) * told
-        total = float(np.sum(variances))
-    else:
-        variances = np.where(rows.in_millimetres, np.einsum("iin->in", rows.covariance), 0.0)
-        total = noise.scale**2 * float(np.sum(variances[:, which]))
+    own = noise_variances(fit.linear, noise, which)
+    total = float(np.sum(np.where(rows.in_millimetres[:, which], own, 0.0)))
     if noise.visit > 0.0:
         usual = noise.visit * np.array([axis.usual_error for axis in rows.machine.axes])
         moved = rows.in_mm(

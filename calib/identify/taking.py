@@ -49,6 +49,13 @@ def noise_covariance(linear: Linearised, noise: Noise, which: BoolArray) -> Arra
     return np.asarray(np.broadcast_to(each, (3, 3, int(which.sum()))))
 
 
+def noise_variances(linear: Linearised, noise: Noise, which: BoolArray) -> Array:
+    """Variance (3, M) of each component by readings' own noise, mm^2 or rad^2."""
+    root = linear.situation.rows.unwhitener[:, :, which]
+    own = noise_covariance(linear, noise, which)
+    return np.asarray(np.einsum("ijn,jkn,ikn->in", root, own, root))
+
+
 def _groups(rows: Rows, kept: BoolArray) -> dict[str, BoolArray]:
     """Readings of a nest, of an instrument, of a run, of a kind: of those that there are two of."""
     labels: list[list[str]] = [[f"nest {name}" for name in rows.nest_name]]

@@ -73,7 +73,7 @@ class Found:
     price: float = 0.0
 
 
-def estimate(problem: LinearProblem, taking: Taking, *, least: float = DEMANDED) -> Found:
+def estimate(problem: LinearProblem, taking: Taking) -> Found:
     """Find the components of noise that the residual of a fit demands.
 
     Parameters
@@ -81,11 +81,9 @@ def estimate(problem: LinearProblem, taking: Taking, *, least: float = DEMANDED)
     problem : LinearProblem
         A fit over A readings' three components (axis after axis), in stated sigmas.
     taking : Taking
-    least : float
-        Rise of the log likelihood that correlation and visits must bring.
     """
     likelihood = Likelihood(problem, taking)
-    bar = _Bar(likelihood, taking, least)
+    bar = _Bar(likelihood)
     now = white = _Sizes((), (), likelihood.of(WHITE))
     gains: dict[str, float] = {}
     found = promising(*likelihood.left(WHITE), taking)
@@ -93,7 +91,7 @@ def estimate(problem: LinearProblem, taking: Taking, *, least: float = DEMANDED)
     while True:
         fading = [part for part in left if part not in WANDERING]
         offers = {part: _joined(likelihood, now, part) for part in fading}
-        if any(now.value - offers[part].value > least for part in FADING if part in offers):
+        if any(now.value - offers[part].value > DEMANDED for part in FADING if part in offers):
             offers |= {part: _joined(likelihood, now, part) for part in WANDERING}
         plain = tuple(offers)
         offers |= {part: _joined(likelihood, now, part) for part in _pointed(likelihood, now, bar)}
@@ -136,9 +134,8 @@ def points_to_scatter(problem: LinearProblem, taking: Taking) -> float:
 class _Bar:
     """How much a component must raise the likelihood."""
 
-    def __init__(self, likelihood: Likelihood, taking: Taking, least: float) -> None:
-        self._likelihood, self._taking = likelihood, taking
-        self._needed = dict.fromkeys(PARTS, least) | {"scale": max(least, RESCALED)}
+    def __init__(self, likelihood: Likelihood) -> None:
+        self._likelihood = likelihood
         self._uneven = frozenset(likelihood.uneven)
         self.chosen = math.log(max(len(self._uneven), 1))
 
@@ -149,12 +146,16 @@ class _Bar:
     def of(self, part: str, offer: "_Sizes") -> float:
         """Rise from which a component counts that has led to ``offer``."""
         if part not in self._uneven:
-            return self._needed[part]
+            return self._needed(part)
         return (UNEVEN + self.chosen) * self.heavy(offer)
+
+    @staticmethod
+    def _needed(part: str) -> float:
+        return RESCALED if part == "scale" else DEMANDED
 
     def price(self, part: str) -> float:
         """What a rise counts less by, where several components would do."""
-        return DEMANDED + self.chosen if part in self._uneven else self._needed[part]
+        return DEMANDED + self.chosen if part in self._uneven else self._needed(part)
 
     def heavy(self, sizes: "_Sizes") -> float:
         """Variance of the readings' squares over that of normal ones."""
@@ -168,7 +169,7 @@ class _Bar:
         """
         if part not in self._uneven:
             return float(0.5 * chi2_above(1.0, 2.0 * gain))
-        sides = 0.5 if self._taking.scatter.is_added(part) else 1.0
+        sides = 0.5 if self._likelihood.taking.scatter.is_added(part) else 1.0
         return min(1.0, len(self._uneven) * sides * float(chi2_above(1.0, 2.0 * gain / heavy)))
 
 

@@ -90,15 +90,20 @@ class Scatter:
 
     def root(self, sizes: Sizes, live: BoolArray | None = None) -> Array:
         """Lower triangular factors (A, 3, 3) of M, of components (3, A) that are held alone."""
-        factors = np.linalg.cholesky(np.moveaxis(of_held(self.covariance(sizes), live), -1, 0))
+        blocks = self.covariance(sizes)
+        if live is not None:
+            blocks = np.where(live[:, None] & live, blocks, np.eye(3)[:, :, None])
+        factors = np.linalg.cholesky(np.moveaxis(blocks, -1, 0))
         return np.asarray(factors, dtype=np.float64)
 
 
-def of_held(blocks: Array, live: BoolArray | None, beside: float = 1.0) -> Array:
-    """Blocks (3, 3, A) of the components that are held; ``beside`` on the diagonal for others."""
-    if live is None:
-        return blocks
-    return np.asarray(np.where(live[:, None] & live, blocks, beside * np.eye(3)[:, :, None]))
+def blocks_left(absorbed: Array, live: BoolArray | None) -> Array:
+    """Blocks (3, 3, A) of M = I - G^T G of single readings, of the components that are held.
+
+    ``absorbed`` is G (p, 3, A), ``live`` (3, A) what is held, if not all.
+    """
+    left = np.eye(3)[:, :, None] - np.einsum("pin,pjn->ijn", absorbed, absorbed)
+    return np.asarray(left if live is None else left * (live[:, None] & live))
 
 
 def uneven(
@@ -123,8 +128,7 @@ def uneven(
     live : (3, A) bool, optional
         Components that are held, if not all.
     """
-    whole = np.eye(3)[:, :, None] - np.einsum("pin,pjn->ijn", absorbed, absorbed)
-    left = of_held(whole, live, beside=0.0)
+    left = blocks_left(absorbed, live)
     freedom = float(np.einsum("iin->", left))
     square = np.sum(residual**2, axis=0)
     if freedom <= 0.0 or not square.any():

@@ -10,7 +10,7 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray, IntArray
 from calib.noise.component import Taking
-from calib.noise.scatter import of_held
+from calib.noise.scatter import blocks_left
 
 POINTS = 0.8
 """Standard deviations from which correlation and visits are asked for: a rise of 0.3."""
@@ -30,7 +30,7 @@ def promising(residual: Array, absorbed: Array, taking: Taking) -> set[str]:
     taking : Taking
     """
     found = set()
-    left = _left(absorbed, taking)
+    left = blocks_left(absorbed, taking.live)
     if taking.alike and _along_time(residual, absorbed, left, taking) > POINTS:
         found.add("time")
     if np.any(taking.visit >= 0) and _by_visit(residual, absorbed, taking) > POINTS:
@@ -40,12 +40,6 @@ def promising(residual: Array, absorbed: Array, taking: Taking) -> set[str]:
     if off > (POINTS if found else POINTS_TO_SCALE):
         found.add("scale")
     return found
-
-
-def _left(absorbed: Array, taking: Taking) -> Array:
-    """Blocks (3, 3, A) of M of the components that are held."""
-    whole = np.eye(3)[:, :, None] - np.einsum("pin,pjn->ijn", absorbed, absorbed)
-    return of_held(whole, taking.live, beside=0.0)
 
 
 def _along_time(residual: Array, absorbed: Array, left: Array, taking: Taking) -> float:

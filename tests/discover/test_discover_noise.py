@@ -54,8 +54,8 @@ def test_correlated_noise_is_named_and_nothing_else_but_what_is_there(hidden, ex
     assert found.last.effects == expected
     assert last.diagnosis.adequate
     assert "the noise is correlated over" in words(last)
-    assert last.noise.components[0].name == "correlated"
-    assert last.noise.components[0].p_value < 1e-6
+    assert last.fit.components_of_noise[0].name == "correlated"
+    assert last.fit.components_of_noise[0].p_value < 1e-6
 
 
 @pytest.mark.parametrize(("hidden", "expected"), [({}, ()), (DRIFT, ("tracker-drift",))])
@@ -63,5 +63,5 @@ def test_a_wandering_tracker_and_one_that_drifts_are_told_apart(hidden, expected
     rows = measured(hidden, 0.0, seed=5, walk=0.0 if hidden else 0.3)
     answer = Refitter(rows, catalogue(rows.machine))(()).run
     assert answer.diagnosis.explained_by == expected
-    assert [one.name for one in answer.noise.components] == ([] if hidden else ["walk"])
+    assert [one.name for one in answer.fit.components_of_noise] == ([] if hidden else ["walk"])
     assert ("the noise wanders by" in words(answer)) == (not hidden)

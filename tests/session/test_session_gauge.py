@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from session_gauges import Hear, begun, once_read, run
 from session_mock import Heard, Mock, start_mock
 
 from app.errors import StoppedByOperator
@@ -41,30 +42,8 @@ def at_the_plate(dial: Mock) -> Mock:
     return dial
 
 
-def begin(site: Site, folder: Path, *hear: Callable[[ev.Event], None], **kind: Any) -> Session:
-    poses = kind.pop("poses", PLACES)
-    options = PlanOptions(warm_up=False, **kind)
-    session = Session.create(site, measure_plan(site, poses, options), folder, unattended=True)
-    for one in hear:
-        session.observers.watch(one)
-    return session
-
-
-async def run(session: Session) -> Path:
-    try:
-        return (await session.run()).run_folder
-    finally:
-        await session.close()
-
-
-def once_read(count: int, do: Callable[[], Any]) -> Callable[[ev.Event], None]:
-    """Do something when so many numbers have been taken."""
-
-    def hear(event: ev.Event) -> None:
-        if isinstance(event, ev.NumberTaken) and event.number == count:
-            do()
-
-    return hear
+def begin(site: Site, folder: Path, *hear: Hear, poses: Any = PLACES, **kind: Any) -> Session:
+    return begun(site, poses, folder, *hear, **kind)
 
 
 async def test_a_plate_is_touched_at_every_place_and_left_upwards(

@@ -1,12 +1,13 @@
 """A probe that only says whether it touches drives a session; and what goes wrong with it."""
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from session_gauges import Hear, begun, once_read, run
 from session_mock import Heard, Mock, start_mock
 
 from app.files.runs import read_run
@@ -49,19 +50,8 @@ def site_of(mock: Mock, folder: Path, **more: float) -> Site:
     return parse_site(text.replace("[gauge]\n", f"[gauge]\n{own}"), "site.toml", folder)
 
 
-def begin(site: Site, folder: Path, *hear: Callable[[ev.Event], None]) -> Session:
-    plan = measure_plan(site, PLACES, PlanOptions(warm_up=False))
-    session = Session.create(site, plan, folder, unattended=True)
-    for one in hear:
-        session.observers.watch(one)
-    return session
-
-
-async def run(session: Session) -> Path:
-    try:
-        return (await session.run()).run_folder
-    finally:
-        await session.close()
+def begin(site: Site, folder: Path, *hear: Hear) -> Session:
+    return begun(site, PLACES, folder, *hear)
 
 
 async def test_a_place_is_latched_where_the_ball_has_just_been_pushed_in(
@@ -114,11 +104,7 @@ async def test_what_a_probe_does_in_the_middle_ends_in_words_and_the_session_goe
 ) -> None:
     site = site_of(probe, tmp_path)
 
-    def once_read(event: ev.Event) -> None:
-        if isinstance(event, ev.NumberTaken) and event.number == 1:
-            probe.hands("fault", name=fault)
-
-    session = begin(site, tmp_path, once_read)
+    session = begin(site, tmp_path, once_read(1, lambda: probe.hands("fault", name=fault)))
     with pytest.raises(DeviceError, match=FAULTS[fault]):
         await run(session)
     probe.hands("clear")
