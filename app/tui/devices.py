@@ -286,8 +286,9 @@ def gauge_text(link: Connected | None, state: GaugeState | None) -> Content:
     if link is not None and state is None:
         lines.append(Content("no answer to the last question; see the alarms"))
     if state is not None:
-        sign = "[$ink-success]✓[/] $said" if state.ready else "[$ink-warning]✗ no number[/]: $said"
-        lines.append(Content.from_markup(sign, said=state.last or "not read yet"))
+        told = "[$ink-success]✓[/] $said" if state.ready else "[$ink-warning]✗ no reading[/]: $said"
+        sign = told if state.last else "[dim]·[/] not read yet"
+        lines.append(Content.from_markup(sign, said=state.last))
     return Content("\n").join(lines)
 
 

@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from app.tui.desk import Desk
 
 
+BY_TRACKER = ("found", "apply", "left", "record")
+"""Steps that a site with a gauge has not: what is verified and written is measured by a tracker."""
+
+
 @dataclass(frozen=True)
 class JobStep:
     """One step: its word, what it does, the keys that begin it; ``live``: it needs the devices."""
@@ -32,7 +36,7 @@ def job_steps(desk: "Desk") -> list[JobStep]:
     ended = desk.picture.purpose if broken else ""  # g on Measure goes on with it
     verifying = "2 g" if ended == "verify" else "6 v"
     measuring = "2 g" if ended == "measure" else "2 n"
-    return [
+    steps = [
         JobStep(
             "connect",
             "open a site and connect (c), or start a mock",
@@ -49,6 +53,8 @@ def job_steps(desk: "Desk") -> list[JobStep]:
         JobStep("left", "verify again", verifying, "left" in done, True),
         JobStep("record", "write the calibration record", "6 p", "record" in done),
     ]
+    by_gauge = desk.site is not None and desk.site.gauge is not None
+    return [step for step in steps if not (by_gauge and step.word in BY_TRACKER)]
 
 
 def next_of(steps: list[JobStep]) -> JobStep | None:

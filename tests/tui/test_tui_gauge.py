@@ -34,5 +34,5 @@ def test_the_last_line_stands_on_devices() -> None:
     link = ev.Connected("gauge", Identity("lines"), "tcp:127.0.0.1:9")
     assert "not connected" in gauge_text(None, None).plain
     assert "✓ +0006.682 mm" in gauge_text(link, GaugeState(True, "+0006.682 mm")).plain
-    assert "no number" in gauge_text(link, GaugeState(False, "ERR 12")).plain
+    assert "no reading" in gauge_text(link, GaugeState(False, "ERR 12")).plain
     assert "no answer" in gauge_text(link, None).plain

@@ -50,6 +50,28 @@ async def test_the_next_step_moves_on_with_the_job(tmp_path: Path) -> None:
         assert next_of(job_steps(desk)) is None
 
 
+GAUGE = """format = "pkm-site/1"
+machine = "delta"
+[controller]
+kind = "operator"
+[gauge]
+kind = "operator"
+reads = "distance"
+sigma = 0.02
+[nests.platform]
+tool = [0.0, 0.0, 0.0]
+"""
+
+
+async def test_with_a_gauge_nothing_comes_next_that_only_a_tracker_can(tmp_path: Path) -> None:
+    (tmp_path / "site.toml").write_text(GAUGE, encoding="utf-8")
+    bench = Workbench(root=tmp_path)
+    async with bench.run_test(size=(80, 24)):
+        await bench.desk.open_site(tmp_path / "site.toml")
+        words = [step.word for step in job_steps(bench.desk)]
+        assert words == ["connect", "measure", "fit", "discover"]
+
+
 def test_a_quick_verification_stands_at_the_places_of_the_whole_one() -> None:
     whole = stream.verified(600.0, 1)
     some = slice(3, None, 8)
