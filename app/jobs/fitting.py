@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from app.analysis import load_rows, masked_rows
 from app.files.models import write_model
@@ -203,15 +203,20 @@ def fit(
     names = names_of(runs)
     rows, effects = load_rows(names, tuple(add), path_of(model))
     found = noisy(fit_effects(rows, effects, masked_rows(rows, lines_of(mask))), path_of(model))
-    noise = noise_report(found)
     remember_fit(found, names)
+    return FitReport.of(said_of_fit(found), _fit=found, _runs=names)
+
+
+def said_of_fit(found: Fit) -> dict[str, Any]:
+    """What there is to say of a fit, as :class:`FitReport` has it."""
+    noise = noise_report(found)
     words = (
         f"As to noise: {noise['words']}" if noise["words"] else "",
         runs_at_odds(found), successive_alike(found), more_than_noise(found), slack_cables(found),
         *beyond_words(found),
     )  # fmt: skip
     log_p = log_chance(found)
-    said = {
+    return {
         **fit_report(found),
         "log10_p": None if log_p is None else log_p / math.log(10.0),
         "p_value": None if log_p is None else math.exp(log_p),
@@ -221,7 +226,6 @@ def fit(
         "record": plain_remarks(record_of(found)),
         "noise": noise,
     }
-    return FitReport.of(said, _fit=found, _runs=names)
 
 
 def keep_model(file: File, found: Fit, runs: tuple[str, ...], way: Way | None = None) -> None:

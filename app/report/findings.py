@@ -7,6 +7,7 @@ import numpy as np
 
 from app.files.staircase import Way
 from app.report import figures
+from app.report.instruments import by_tracker
 from app.report.page import Block, Items, Picture, Section, Table, Text
 from app.report.words import plain, with_uncertainty
 from app.show.record_words import excluded_lines
@@ -33,6 +34,9 @@ def fit_section(
         ),
     )
     residual = np.linalg.norm(fit.linear.residual[:, fit.accepted], axis=0) * 1e3
+    shown = "Difference of each reading from its prediction"
+    if by_tracker(fit):
+        shown = "Distance between measured and predicted reflector centre"
     blocks: list[Block] = [
         Text(
             f"{answer['readings']} readings, {len(answer['parameters'])} unknowns. Chi-square per "
@@ -42,7 +46,7 @@ def fit_section(
         Table(("distance measured to predicted", "RMS, µm", "a perfect model leaves, µm"), rows),
         Picture.of(
             figures.residual_cloud(residual, float(answer["noise_floor_um"])),
-            "Distance between measured and predicted reflector centre, in the order of measuring.",
+            f"{shown}, in the order of measuring.",
         ),
     ]
     blocks += [
@@ -84,7 +88,8 @@ def effects_section(
         )
         for name in effects
     ]
-    heads = ("effect", "moves the reflector, RMS µm", "at most, µm", "")
+    what = "reflector" if by_tracker(fit) else "nests"
+    heads = ("effect", f"moves the {what}, RMS µm", "at most, µm", "")
     blocks: list[Block] = [
         Table(heads, tuple(moved), "Over the readings of the platform.", words=(3,)),
         Table(
@@ -225,7 +230,10 @@ def drift_section(fit: Fit, limit_um: float | None) -> Section:
             series[name] = (run.time_s[at], shift)
             worst[number] = max(worst.get(number, 0.0), float(shift.max()))
     if not series:
-        return Section("Stability", (Text("No base nest was read twice: drift was not watched."),))
+        said = "No base nest was read twice: drift was not watched."
+        if not by_tracker(fit):
+            said = "The base was not read: what drifts shows in readings that are repeated alone."
+        return Section("Stability", (Text(said),))
     if len(runs) == 1:
         said = f"Base nests moved at most {worst[1]:.1f} µm from their first reading."
     else:

@@ -5,6 +5,7 @@ from typing import Any
 
 from app.files.record_details import RecordDetails
 from app.report.accuracy import FOUND, LEFT, Tolerance
+from app.report.instruments import by_tracker, other_instruments, taken_words
 from app.report.page import Block, Facts, Items, Section, Table, Text
 from app.report.sources import Sources
 from app.report.words import day, minute, plain
@@ -12,6 +13,21 @@ from app.session.taken import Span, Taken
 from calib.identify import Fit
 
 SIMULATED = "(mock)"
+ROUGHLY = "the places of instruments, nests and planes that are known only roughly"
+OF_ERRORS = (
+    "Those of errors hold what the tracker states of each reading, carried through the rigid fits "
+    "of platform and base; those of parameters hold it together with the tolerances of what the "
+    "readings leave open. "
+)
+OF_PARAMETERS = (
+    "Those of parameters hold what is stated of each reading, together with the tolerances of what "
+    "the readings leave open. "
+)
+OF_DRAWING = (
+    "Not contained are the places of the nests on platform and base, which are taken from their "
+    "drawing."
+)
+OF_EXACT = "Not contained are the places of nests and planes that are stated as exact."
 CHANNELS = {
     "air_temp_C": ("air temperature", "°C", 2),
     "structure_temp_C": ("temperature of the structure", "°C", 2),
@@ -52,6 +68,7 @@ def instruments_section(details: RecordDetails, sources: Sources, fit: Fit) -> S
     for one in _all_taken(sources):
         seen.update(one.identities)
     controller, tracker = seen.get("controller", {}), seen.get("tracker", {})
+    gauge = seen.get("gauge", {})
     serial = header.controller_serial or controller.get("serial", "")
     rows = (
         ("Machine", _line(machine.says or machine.name, details.machine_maker)),
@@ -66,11 +83,13 @@ def instruments_section(details: RecordDetails, sources: Sources, fit: Fit) -> S
         ("Reflector, calibrated", details.reflector_calibrated),
         ("Thermometer of the structure", details.thermometer),
         ("Thermometer, calibrated", details.thermometer_calibrated),
+        ("Gauge", _device(gauge, "") if gauge.get("serial") else ""),
+        ("Instruments", ", ".join(other_instruments(fit))),
         ("Nests", f"platform: {', '.join(header.platform_nests)}; base: "
                   f"{', '.join(header.base_nests) or 'none'}"),
     )  # fmt: skip
     blocks: list[Block] = [Facts(rows)]
-    blocks.append(Text(_traceability(details)))
+    blocks.append(Text(_traceability(details, fit)))
     missing = [
         what
         for what, said in (
@@ -79,7 +98,7 @@ def instruments_section(details: RecordDetails, sources: Sources, fit: Fit) -> S
             ("place", details.place.strip()),
             ("operator", details.operator.strip()),
             ("the machine's own serial number", details.machine_serial),
-            ("the reflector's calibration", details.reflector_calibrated),
+            ("the reflector's calibration", details.reflector_calibrated or not by_tracker(fit)),
         )
         if not said
     ]
@@ -89,8 +108,14 @@ def instruments_section(details: RecordDetails, sources: Sources, fit: Fit) -> S
     return Section("Item and instruments", tuple(blocks))
 
 
-def _traceability(details: RecordDetails) -> str:
+def _traceability(details: RecordDetails, fit: Fit) -> str:
     """Whether lengths go back to the metre, and by which certificate."""
+    if not by_tracker(fit):
+        named = " and ".join(other_instruments(fit)) or "the instruments"
+        return (
+            "Metrological traceability is not shown: the laboratory states no certificate of "
+            f"{named}."
+        )
     if details.tracker_calibrated and details.tracker_certificate:
         return (
             "Lengths are traceable to the metre by the calibration of the laser tracker, "
@@ -165,33 +190,31 @@ def method_section(
 ) -> Section:  # fmt: skip
     """How it was done, what the uncertainties hold, how conformity is decided."""
     rows = fit.model.rows
-    nests, base = rows.runs[-1].header.platform_nests, rows.runs[-1].header.base_nests
-    poses = len({(run.source, pose) for run in rows.runs for pose in run.pose if pose})
+    checked, tracked = sources.before or sources.after, by_tracker(fit)
     machine = sum(
         p.name in {r["name"] for r in answer["parameters"]} for p in rows.machine.parameters
     )
     said = [
-        f"A laser tracker measured the centre of a reflector in {len(nests)} nests of the platform "
-        f"at {poses} poses, and, again and again in between, in {len(base)} nests of the base, "
-        "which tie the tracker to the machine.",
+        *taken_words(fit),
         f"From these readings {machine} parameters of the machine's kinematic model, its effects "
-        "beside the geometry and the place of the tracker were identified together, by maximum "
-        "likelihood with the manufacturing tolerances as prior knowledge; poses held out of the "
-        "fit decided what the model may contain.",
-        "As found and as left the machine was sent to poses that no fit has used; at each the pose "
-        "of the platform was found from its nests in the base frame that the base nests give, and "
-        "compared with the pose that was commanded.",
+        f"beside the geometry and {'the place of the tracker' if tracked else ROUGHLY} were "
+        "identified together, by maximum likelihood with the manufacturing tolerances as prior "
+        "knowledge; poses held out of the fit decided what the model may contain.",
     ]
+    if checked:
+        said.append(
+            "As found and as left the machine was sent to poses that no fit has used; at each the "
+            "pose of the platform was found from its nests in the base frame that the base nests "
+            "give, and compared with the pose that was commanded."
+        )
     blocks: list[Block] = [Text(" ".join(said))]
     if details.procedure:
         blocks.append(Text(f"Procedure: {details.procedure}."))
     blocks.append(
         Text(
-            "Expanded uncertainties U have the coverage factor k = 2, about 95 %. Those of errors "
-            "hold what the tracker states of each reading, carried through the rigid fits of "
-            "platform and base; those of parameters hold it together with the tolerances of what "
-            "the readings leave open. Not contained are the places of the nests on platform and "
-            "base, which are taken from their drawing."
+            "Expanded uncertainties U have the coverage factor k = 2, about 95 %. "
+            + (OF_ERRORS if checked else OF_PARAMETERS)
+            + (OF_DRAWING if tracked else OF_EXACT)
         )
     )
     if tolerance.um is not None or tolerance.mdeg is not None:
@@ -220,7 +243,7 @@ def statements_section(details: RecordDetails, sources: Sources) -> Section:
         "It may be copied as a whole only, unless the laboratory agrees in writing.",
     ]
     if simulated:
-        items.insert(0, "Controller and tracker were simulated ones: there is no such machine.")
+        items.insert(0, "Controller and instruments were simulated ones: there is no such machine.")
     blocks: list[Block] = [Items(tuple(items))]
     if details.remarks:
         blocks.insert(0, Text(details.remarks.strip()))

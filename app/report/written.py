@@ -93,7 +93,7 @@ def _cost(name: str, why: str, effects: Mapping[str, str], reach: Mapping[str, R
         return f"{said}."
     far = reach[name]
     return (
-        f"{said}. It moves the reflector by {far.rms_um:.1f} µm RMS, at most "
+        f"{said}. It moves the nests by {far.rms_um:.1f} µm RMS, at most "
         f"{far.largest_um:.1f} µm, over the measured poses: so much of it stays in the machine."
     )
 

@@ -10,18 +10,16 @@ import numpy as np
 from app.analysis import looked_at, masked_rows
 from app.files.models import offered_effects, own_effects
 from app.files.runs import read_runs
+from app.jobs.fitting import said_of_fit
 from app.jobs.remembering import remember_fit
 from app.noisy import noisy
 from app.tui.reading_lines import ReadingLine, lines_of_fit
 from calib.arrays import Array
-from calib.discover.noise_report import noise_report
 from calib.effects import Effect, effect_named
-from calib.identify import Fit, fit_report
+from calib.identify import Fit
 from calib.identify.staged import fit_effects
 from calib.identify.starting import begin
-from calib.look.judged import record_of
 from calib.model import Model
-from calib.runs.remark import plain_remarks
 from calib.runs.stack import Rows
 
 
@@ -90,6 +88,5 @@ def answer_of(runs: tuple[str, ...], found: Fit) -> FitAnswer:
     before = np.linalg.norm(nominal.residual[:, found.accepted], axis=0)
     after = np.linalg.norm(found.linear.residual[:, found.accepted], axis=0)
     effects = tuple(effect.id for effect in found.model.effects)
-    said = {**fit_report(found), "record": plain_remarks(record_of(found))}
-    said["noise"] = noise_report(found)
+    said = said_of_fit(found)
     return FitAnswer(runs, effects, found, said, before, after, tuple(lines_of_fit(found)))

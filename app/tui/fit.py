@@ -19,6 +19,7 @@ from app.tui.widgets.plots import PairPlot
 from app.tui.widgets.tables import fill
 from app.tui.wording import micro
 from calib.digits import Digits, fixed
+from calib.discover.agreement import DOUBTED
 
 if TYPE_CHECKING:
     from app.tui.analysis import FitAnswer
@@ -149,13 +150,13 @@ def summary(answer: "FitAnswer | None", runs: tuple[str, ...]) -> Content:
 
 
 def verdict(report: dict[str, Any]) -> str:
-    """Say in a word whether the model explains the readings."""
-    chi2 = report["chi2_per_dof"]
-    if chi2 is None:
+    """Say in a word whether the model explains the readings, by the odds of chance."""
+    by_chance = report["p_value"]
+    if by_chance is None:
         return "too few"
-    if chi2 > 1.25:
+    if by_chance < DOUBTED:
         return "! too much"
-    return "✓ good" if chi2 > 0.75 else "! too little"
+    return "✓ good" if by_chance < 1.0 - DOUBTED else "! too little"
 
 
 def words(answer: "FitAnswer | None") -> Content:
@@ -163,21 +164,14 @@ def words(answer: "FitAnswer | None") -> Content:
     if answer is None:
         return Content("")
     report = answer.report
-    chi2 = report["chi2_per_dof"]
     parts: list[Content] = [
         Content.from_markup("[$ink-warning]![/] $said", said=micro(said))
         for said in remark_lines(report)
     ]
-    noise = report["noise"]["words"]
-    if noise:
-        parts.append(Content.from_markup("[$ink-warning]![/] As to noise: $said.", said=noise))
-    elif chi2 is not None and chi2 > 1.25:
-        parts.append(
-            Content.from_markup(
-                "[$ink-warning]![/] More is left than noise: an effect is missing, or the "
-                "readings' uncertainties are too small."
-            )
-        )
+    parts += [
+        Content.from_markup("[$ink-warning]![/] $said", said=micro(said))
+        for said in report["remarks"]
+    ]
     parts += [
         Content.from_markup("[$ink-warning]✗[/] $told", told=told)
         for told in excluded_lines(report)

@@ -92,3 +92,17 @@ def test_a_plane_that_lies_elsewhere_in_another_run_is_refused() -> None:
     lab.header["planes"]["bed"]["through"][2] -= 1.0
     with pytest.raises(BadInput, match="plane bed lies elsewhere"):
         stack(machine, [one, parse_run(*lab.texts(), actuators=3)])
+
+
+def test_a_record_says_what_took_its_readings(two: tuple[Path, Path], tmp_path: Path) -> None:
+    file = tmp_path / "record.html"
+    pages = []
+    for runs in (two[1:], two):
+        assert run(["report", *map(str, runs), "--out", str(file)]) == 0
+        pages.append(file.read_text(encoding="utf-8"))
+    for page in pages:
+        assert "The instrument probe took 14 readings of the kind point at 14 poses." in page
+        assert "The instrument calipers took 7 readings of the kind distance" in page
+    assert "laser tracker" not in pages[0]
+    assert "reflector" not in pages[0]
+    assert "A laser tracker measured the centre of a reflector in 3 nests" in pages[1]
