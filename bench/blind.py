@@ -2,13 +2,16 @@
 
     python -m bench blind [--cases 400] [--null 400] [--seed 1] [--page docs/blind-trial.md]
     python -m bench blind --cases 60 --null 100 --noise ar:0.5    # walk:0.3, visit:1, t:5 ...
+    python -m bench blind --keep FOLDER --minutes 30              # again and again: it goes on
 
 The runs come from the mock's own physics (`mocks.simulate`), which imports neither the engine nor
 the effects. What is written to the page is measured by this command.
 """
 
 import argparse
+import hashlib
 import os
+import pickle
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -38,6 +41,13 @@ from mocks.simulate.files import points_csv, run_toml
 
 SHARE = 4
 """Cases of one question."""
+OF_OLD = (
+    "backlash", "creep", "frame-shift", "gravity-sag", "joint-azimuth", "joint-tilt",
+    "leg-compliance", "nest-offset", "parallelogram-sides", "redundancy", "screw-cyclic",
+    "screw-pitch", "screw-twist", "settling", "thermal-growth", "tracker-drift", "tracker-offset",
+    "tracker-scale",
+)  # fmt: skip
+"""A catalogue of earlier: what those that came since cost its effects is told."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +57,8 @@ class Outcome:
     ``first`` is the effect that the first diagnosis names, ``found`` those that discovery has added
     and kept; ``foreseen`` one for each hidden effect, in a model that has the others; ``after`` the
     first effect and the groups after a designed follow-up, where there was one; ``hinted`` what was
-    called for too weakly to be added.
+    called for too weakly to be added. ``among_fewer`` is the power where only the effects of an
+    earlier catalogue are looked for, of one hidden effect; ``seconds`` are CPU time of discovery.
     """
 
     case: Case
@@ -60,6 +71,7 @@ class Outcome:
     holdout_rose: bool
     pulls: tuple[float, ...] = ()
     foreseen: tuple[Foreseen, ...] = ()
+    among_fewer: float = float("nan")
     after: tuple[str | None, tuple[tuple[str, ...], ...]] | None = None
     hinted: tuple[str, ...] = ()
     bad: int = 0
@@ -99,13 +111,13 @@ def solve(case: Case) -> Outcome:
     """Simulate, discover, compare."""
     poses = poses_of(case)
     simulated, hidden = build(case, poses)
-    begin = time.perf_counter()
+    begin = time.process_time()
     machine = machine_named(case.machine)
     run = parse_run(run_toml(simulated), points_csv(simulated), actuators=len(machine.actuators))
     rows = stack(machine, [run])
     refit = Refitter(rows, catalogue(machine))
     found = discover_run(refit)
-    seconds = time.perf_counter() - begin
+    seconds = time.process_time() - begin
     last = stage_of(found)
     name, groups = named(found)
     after = None
@@ -124,6 +136,7 @@ def solve(case: Case) -> Outcome:
         holdout_rose=_rose(found),
         pulls=pulls(rows, hidden, last),
         foreseen=_foreseen(case, poses, hidden, refit),
+        among_fewer=_among_fewer(case, poses, hidden, refit),
         after=after,
         bad=len(last.run.fit.bad),
         seconds=seconds,
@@ -152,6 +165,15 @@ def _foreseen(
     return tuple(found)
 
 
+def _among_fewer(case: Case, poses: object, hidden: dict[str, float], refit: Refitter) -> float:
+    """Power of one hidden effect where only those of an earlier catalogue are looked for."""
+    if case.kind != "single" or case.noise or case.effects[0] not in OF_OLD:
+        return float("nan")
+    fewer = [effect for effect in refit.effects.values() if effect.id in OF_OLD]
+    stage = Refitter(refit.rows, fewer)(())
+    return foreseen(case, poses, hidden, case.effects[0], stage).power
+
+
 def attempt(case: Case) -> Outcome:
     """Solve a case; one that ends in an error counts as wrong, or as an alarm, and is listed."""
     try:
@@ -160,18 +182,54 @@ def attempt(case: Case) -> Outcome:
         return Outcome(case, False, None, (), (), False, float("nan"), False, failure=str(error))
 
 
-def attempts(cases: Sequence[Case]) -> list[Outcome]:
-    """Solve some cases."""
-    return [attempt(case) for case in cases]
+@dataclass(frozen=True)
+class Share:
+    """Some cases, and the file that keeps what was found in them; none where nothing is kept."""
+
+    cases: tuple[Case, ...]
+    file: Path | None = None
+    until: float = float("inf")
+    """Not begun after this time of ``time.time``."""
+
+    def found(self) -> list[Outcome]:
+        """What is kept; solved and kept where it is not; nothing where it is too late."""
+        if self.file is not None and self.file.exists():
+            return list(pickle.loads(self.file.read_bytes()))
+        if time.time() > self.until:
+            return []
+        outcomes = [attempt(case) for case in self.cases]
+        if self.file is not None:
+            part = self.file.with_suffix(f".{os.getpid()}")
+            part.write_bytes(pickle.dumps(outcomes))
+            part.replace(self.file)
+        return outcomes
 
 
-def run_all(cases: Sequence[Case], workers: int, scheduler: str = "") -> list[Outcome]:
-    """Solve all cases on several processes, or by the workers of a Dask scheduler."""
+def run_all(
+    cases: Sequence[Case],
+    workers: int,
+    scheduler: str = "",
+    keep: Path | None = None,
+    minutes: float = float("inf"),
+) -> list[Outcome]:
+    """Solve all cases on several processes, or by the workers of a Dask scheduler.
+
+    With a folder ``keep`` what was solved is kept there and not asked again, and no share is begun
+    after so many minutes; shares are asked in an order that is drawn, so that some stand for all.
+    """
     from bench import blind as here  # importable by name in the other processes
 
-    shares = [cases[first : first + SHARE] for first in range(0, len(cases), SHARE)]
-    found = dict(spread(here.attempts, shares, workers=workers, scheduler=scheduler))
-    return [one for number in range(len(shares)) for one in found[number]]
+    until = time.time() + 60.0 * minutes
+    shares = []
+    for first in range(0, len(cases), SHARE):
+        some = tuple(cases[first : first + SHARE])
+        name = hashlib.sha256(repr(some).encode()).hexdigest()[:16] + ".outcomes"
+        shares.append(here.Share(some, None if keep is None else keep / name, until))
+    order = np.random.default_rng(len(shares)).permutation(len(shares))
+    asked = [shares[k] for k in order]
+    found = dict(spread(here.Share.found, asked, workers=workers, scheduler=scheduler))
+    answers = {int(order[number]): outcomes for number, outcomes in found.items()}
+    return [one for number in range(len(shares)) for one in answers[number]]
 
 
 def main() -> None:
@@ -185,15 +243,21 @@ def main() -> None:
     parser.add_argument("--only", choices=("single", "several", "unknown"))
     parser.add_argument("--hide", help="effects that may be hidden, by comma; all by default")
     parser.add_argument("--noise", default="", help="other noise than is stated: ar:0.5 ...")
+    parser.add_argument("--keep", type=Path, help="folder of what was solved; goes on from it")
+    parser.add_argument(
+        "--minutes", type=float, default=float("inf"), help="with --keep: then stop"
+    )
     parser.add_argument("--page", type=Path)
     options = parser.parse_args()
     command = f"python -m bench blind --cases {options.cases} --null {options.null}"
+    command += f" --machines {options.machines}"
     command += f" --hide {options.hide}" if options.hide else ""
     command += f" --noise {options.noise}" if options.noise else ""
     allowed = options.hide.split(",") if options.hide else None
+    if options.keep is not None:
+        options.keep.mkdir(parents=True, exist_ok=True)
     text = f"# Blind trial\n\nWritten by `{command} --seed {options.seed}`.\n{INTRODUCTION}"
     for machine in options.machines.split(","):
-        begin = time.perf_counter()
         cases = [
             case
             for case in draw_cases(options.cases, options.seed, machine, allowed)
@@ -201,8 +265,8 @@ def main() -> None:
         ]
         nulls = draw_nulls(options.null, options.seed, machine)
         asked = [replace(case, noise=options.noise) for case in (*cases, *nulls)]
-        outcomes = run_all(asked, options.workers, options.scheduler)
-        text += "\n" + page(outcomes, machine, time.perf_counter() - begin)
+        outcomes = run_all(asked, options.workers, options.scheduler, options.keep, options.minutes)
+        text += "\n" + page(outcomes, machine)
     print(text)
     if options.page is not None:
         options.page.write_text(text, encoding="utf-8")
