@@ -19,7 +19,7 @@ from mocks.physics.body import Body, Surroundings
 from mocks.physics.circumstances import Circumstances, Stroke
 from mocks.physics.climate import Climate
 from mocks.physics.motion import LegMotion
-from mocks.physics.pose import Array, Pose, rotation_from_vector
+from mocks.physics.pose import Array, Pose, rotation_from_rpy, rotation_from_vector
 from mocks.physics.room import HOME_REFLECTOR, Distortions, Station
 from mocks.physics.signals import Steps
 from mocks.physics.stand import Stand
@@ -74,7 +74,7 @@ class World:
         self._stand = Stand(plan.hidden, self.body, carried)
         self.faults = FaultSet()
         self.climate = Climate(plan.seed)
-        self.station = Station(plan.seed, self.around.place)
+        self.station = Station(plan.seed, self.around.place, _seen(self.around, self.machine))
         self.distortions = Distortions(plan.hidden, self.body)
         widths = play_widths(plan.hidden, self.body.limbs, self.body.stroke)
         self.legs = [LegMotion(self.clock, width) for width in widths]
@@ -201,6 +201,13 @@ class World:
             return self._real.home(count)
         last = self._last
         return Pose(np.repeat(last.position, count, 0), np.repeat(last.rotation, count, 0))
+
+
+def _seen(around: Surroundings, machine: Machine) -> Array:
+    """Where nests are before anything has moved: base frame, (N, 3), mm."""
+    at, turns = np.array(machine.home[:3]), rotation_from_rpy(*machine.home[3:])
+    carried = at + np.array(list(around.platform_nests.values())) @ turns.T
+    return np.concatenate([carried, list(around.base_nests.values())])
 
 
 def _smrs(plan: WorldPlan, around: Surroundings) -> Smrs:

@@ -9,6 +9,9 @@ from mocks.physics.pose import Array, rotation_from_rpy, rpy_from_rotation
 
 HOME_REFLECTOR = (0.0, 180.0, -60.0)
 """Birdbath, tracker frame, mm."""
+CLEAR_MM, TURN_RAD = 20.0, float(np.pi / 6.0)
+"""How far a line of sight passes the birdbath, as an SMR in it is 19 mm thick and is searched for
+within 20; by how much the tracker is turned on its stand until it does."""
 
 BEARING_SPREAD_RAD = float(np.radians(6.0))
 
@@ -18,10 +21,11 @@ class Station:
 
     The tracker stands 1.2 to 1.4 m away, at a height that suits the machine, levelled to some
     milliradians. It is put where an operator would put it: between two nests of the platform, so
-    that no SMR hides another within the 20 deg by which a hexapod's platform turns.
+    that no SMR hides another within the 20 deg by which a hexapod's platform turns, and turned on
+    its stand so that its own birdbath hides none of the points ``seen`` (N, 3), base frame, mm.
     """
 
-    def __init__(self, seed: int, place: Place) -> None:
+    def __init__(self, seed: int, place: Place, seen: Array | None = None) -> None:
         rng = np.random.default_rng([seed, 2])
         every = 2.0 * np.pi / place.bearings
         side = rng.integers(place.bearings) * every + place.first_rad
@@ -35,6 +39,16 @@ class Station:
         )
         rx, ry = rng.normal(0.0, 0.004, 2)
         self.rotation = rotation_from_rpy(rx, ry, yaw)
+        turn = rotation_from_rpy(0.0, 0.0, TURN_RAD)
+        while seen is not None and self._passes_birdbath_mm(seen) < CLEAR_MM:
+            self.rotation, self.translation = turn @ self.rotation, turn @ self.translation
+
+    def _passes_birdbath_mm(self, seen: Array) -> float:
+        """Least distance of the birdbath from the lines of sight to points (N, 3), base frame."""
+        sights, bath = self.to_tracker(seen), np.array(HOME_REFLECTOR)
+        sights /= np.linalg.norm(sights, axis=1, keepdims=True)
+        along = np.maximum(sights @ bath, 0.0)[:, None]
+        return float(np.linalg.norm(bath - along * sights, axis=1).min())
 
     def frame(self) -> list[float]:
         """x, y, z (mm), rx, ry, rz (rad) of the base frame in the tracker frame."""

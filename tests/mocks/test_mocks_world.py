@@ -7,6 +7,7 @@ from mocks.clock import ManualClock
 from mocks.hidden.table import Hidden
 from mocks.physics.hexapod_body import AROUND
 from mocks.physics.pose import Array, rotation_from_rpy, rotation_from_vector
+from mocks.physics.room import HOME_REFLECTOR
 from mocks.physics.room import Station as TrackerStation
 from mocks.physics.truth import nominal_parameters
 from mocks.tracker.sensor import Sensor, refraction_ppm
@@ -309,3 +310,17 @@ def test_no_smr_hides_another_from_the_tracker(seed: int) -> None:
             sight = (nests[i] - tracker) / np.linalg.norm(nests[i] - tracker)
             apart = nests[j] - nests[i]
             assert np.linalg.norm(apart - (apart @ sight) * sight) > 8.0
+
+
+@pytest.mark.parametrize("seed", [7, 13, 15000])
+def test_a_tracker_is_turned_until_its_own_birdbath_hides_no_nest(seed: int) -> None:
+    world, at_once = World(ManualClock(), WorldPlan(seed=seed)), TrackerStation(seed, AROUND.place)
+    bath = np.array(HOME_REFLECTOR)
+    for nest in (*AROUND.platform_nests, *AROUND.base_nests):
+        sight = world.nest_in_tracker(nest, np.zeros(1))[0]
+        sight /= np.linalg.norm(sight)
+        assert bath @ sight < 0.0 or np.linalg.norm(bath - (bath @ sight) * sight) > 19.0
+    turned = world.station.rotation @ at_once.rotation.T
+    assert (seed == 7) == np.allclose(turned, np.eye(3))  # as it stood
+    np.testing.assert_allclose(turned[2], [0.0, 0.0, 1.0], atol=1e-12)
+    np.testing.assert_allclose(world.station.translation, turned @ at_once.translation)

@@ -15,7 +15,7 @@ from app.session import events as ev
 from app.session import kinds
 from app.session.journal import NewRow
 from app.session.plan import Plan, PlanWriter, Step
-from app.session.routines.beam import measured
+from app.session.routines.beam import aim, measured
 from app.session.routines.carrying import ensure_smr, misplaced
 from app.session.routines.moving import commanded_coordinates, ensure_at, take_stock
 from app.session.routines.preparing import warm_up
@@ -83,6 +83,33 @@ def test_an_smr_in_no_nest_is_told_by_its_distance(lab: Lab, frame_found: bool) 
         says = misplaced(work, "b1", "a", work.predict("b1", "a") + off)
         said = f"the SMR is {allowed + beyond:.2f} mm from nest b1 and in no other nest"
         assert says == (said if beyond > 0.0 else "")
+
+
+@pytest.mark.parametrize(("part", "beside", "says"), [
+    (0.15, 0.0, "stands in the line of sight to nest b1"), (0.15, 40.0, "in no other nest"),
+    (0.965, 0.0, "in no other nest"), (1.3, 0.0, "in no other nest"),
+])  # fmt: skip
+def test_an_smr_before_a_nest_is_told_from_one_beside_it(
+    lab: Lab, part: float, beside: float, says: str
+) -> None:
+    work = lab.session.work
+    sight = work.predict("b1", "a")
+    across = np.cross([0.0, 0.0, 1.0], sight)
+    seen = part * sight + beside * across / np.linalg.norm(across)
+    assert says in misplaced(work, "b1", "a", seen)
+
+
+async def test_a_hidden_base_nest_is_told_with_what_hides_it(
+    lab: Lab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    work, before = lab.session.work, lab.room.sees("b1")
+    await ensure_at(work, "home")
+    await aim(work, "b1")
+    work.memory.settled = True
+    monkeypatch.setattr(lab.room, "sees", lambda _: 0.15 * before)
+    with pytest.raises(NotReady, match="in the line of sight to nest b1") as raised:
+        await reference(work, step(kinds.REFERENCE, nest="b1"))
+    assert "birdbath" in str(raised.value.remedy)
 
 
 @pytest.mark.parametrize(("base_smrs", "nest", "asks"), [

@@ -14,6 +14,8 @@ from drivers.errors import BeamBroken, NoTarget
 _LOOK_S = 0.5
 """Dwell of a look that only asks which nest it is, s."""
 TRIES = 3
+BEHIND_MM, BESIDE_MM = 50.0, 30.0
+"""How much nearer than a nest, and how near its line of sight, an SMR is that stands in the way."""
 
 
 async def carry(work: Work, step: Step) -> Done:
@@ -97,7 +99,22 @@ def misplaced(work: Work, nest: str, label: str, xyz: Array) -> str:
         return ""
     if distance[nearest] <= allowed:
         return f"the tracker sees nest {nearest} where nest {nest} was expected"
-    return f"the SMR is {distance[nest]:.2f} mm from nest {nest} and in no other nest"
+    other = in_the_way(work, nest, label, xyz)
+    return other or f"the SMR is {distance[nest]:.2f} mm from nest {nest} and in no other nest"
+
+
+def in_the_way(work: Work, nest: str, label: str, xyz: Array) -> str:
+    """Say that a reading is of another SMR on the line of sight to a nest; empty if it is not."""
+    wanted = work.predict(nest, label)
+    away = float(np.linalg.norm(wanted))
+    along = float(xyz @ wanted) / away
+    beside = float(np.linalg.norm(xyz - along * wanted / away))
+    if not BEHIND_MM < along < away - BEHIND_MM or beside > BESIDE_MM:
+        return ""
+    return (
+        f"an SMR {np.linalg.norm(xyz):.0f} mm from the tracker stands in the line of sight to "
+        f"nest {nest}, which is {away:.0f} mm away"
+    )
 
 
 def rejected_row(

@@ -8,7 +8,7 @@ from app.files.pose_table import HOME
 from app.session.events import DriftChecked, FrameFound
 from app.session.plan import Step
 from app.session.routines.beam import measured
-from app.session.routines.carrying import ensure_smr, rejected_row
+from app.session.routines.carrying import ensure_smr, in_the_way, rejected_row
 from app.session.routines.conditions import channels
 from app.session.routines.moving import ensure_at
 from app.session.routines.reading import reading_row, reading_taken
@@ -30,12 +30,16 @@ async def reference(work: Work, step: Step) -> Done:
     if not work.memory.frame_found:
         allowed += work.site.tracker.frame_radius_mm
     if miss > allowed:
-        why = f"{miss:.1f} mm from where nest {nest} should be"
+        other = in_the_way(work, nest, HOME, np.array(reading.xyz))
+        why = other or f"{miss:.1f} mm from where nest {nest} should be"
         work.set_aside(rejected_row(work, "", nest, reading.xyz, why))
+        hidden = (
+            "Take it away, or turn or move the tracker (an SMR that near is often that of its "
+            "own birdbath) and state its new frame in the site file"
+        )
+        seen = "Check the SMR in that nest and the tracker's frame in the site file"
         raise NotReady(
-            f"reference {nest}: {why}",
-            device="tracker",
-            remedy="Check the SMR in that nest and the tracker's frame in the site file",
+            f"reference {nest}: {why}", device="tracker", remedy=hidden if other else seen
         )
     row = reading_row(work, reading, begun, "", nest, await channels(work))
     says = f"{nest} read, {miss:.3f} mm from its predicted place"
