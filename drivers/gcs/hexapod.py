@@ -214,7 +214,7 @@ class GcsHexapod:
         Raises Refused (no such pose, limits, not enabled, another pivot or coordinate system than
         wanted) or the standing fault.
         """
-        self._motion.check_numbers(pose)
+        self._motion.check_numbers(pose, len(OURS), "a pose")
         wishes = self._wishes
         await self._motion.to(
             wishes.convention.written(pose), lambda line: need_frame(line, wishes.frame)

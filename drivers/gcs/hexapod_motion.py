@@ -4,36 +4,31 @@ Status comes from #5 (does it move), ``ONT?``, ``SVO?`` and ``FRF?``: such a con
 status register.
 """
 
-import asyncio
-import math
 import time
 from collections.abc import Callable, Sequence
-from typing import TypeVar
 
-from drivers.errors import DeviceError, DeviceFault, DriveFault, Refused, Silence
+from drivers.errors import DeviceFault, DriveFault, Refused
 from drivers.gcs.answers import numbers
-from drivers.gcs.errors import NOT_ENABLED, STARTING, UNKNOWN_COMMAND
+from drivers.gcs.errors import STARTING, UNKNOWN_COMMAND
 from drivers.gcs.line import ANSWER_S, Line
 from drivers.gcs.link import GcsLink
+from drivers.gcs.moving import STOP_S, Moving
 from drivers.stopping import STILL_MOVING, confirmed, within
 
-T = TypeVar("T")
-REFERENCE_S, REST_S, STOP_S, POLL_S = 120.0, 1.5, 2.5, 0.01
+REFERENCE_S = 120.0
 Written = tuple[float, ...]
 """X, Y, Z, U, V, W in the controller's own units."""
 
 
-class HexapodMotion:
+class HexapodMotion(Moving):
     """Starts, waits for and stops the motions of one controller."""
 
     def __init__(self, link: GcsLink, axes: Sequence[str]) -> None:
-        self._link = link
+        super().__init__(link, 0.01, "legs")
         self._axes = tuple(axes)
-        self._device = link.device
         self._limits: tuple[Written, Written] = ((), ())
         self._asks_first = True
         self._target: Written = ()
-        self._stopped = False
         self._powered = False
         self._known = False
 
@@ -90,7 +85,7 @@ class HexapodMotion:
                 remedy="Check the emergency stop, the enable inputs and the motors' supply",
             )
         self._powered, self._known = True, known
-        self._stopped = stops != self._link.line.stops
+        self.switched_on(stops)
 
     async def disable(self) -> None:
         """Switch all servos off."""
@@ -101,15 +96,6 @@ class HexapodMotion:
         return "SVO " + " ".join(f"{axis} {int(on)}" for axis in self._axes)
 
     # ------------------------------------------------------------ starting
-
-    def check_numbers(self, pose: tuple[float, ...]) -> None:
-        """Refuse what is no pose."""
-        if len(pose) != len(self._axes) or not all(map(math.isfinite, pose)):
-            raise Refused(
-                f"a pose has {len(self._axes)} finite numbers, this is {pose}",
-                device=self._device,
-                remedy="Nothing was commanded",
-            )
 
     async def to(self, target: Written, first: Callable[[Line], None]) -> None:
         """Start towards a target, after ``first`` and after asking whether it is reachable."""
@@ -154,26 +140,6 @@ class HexapodMotion:
                 remedy="Choose a pose nearer to its middle",
             )
 
-    async def _started(self, start: Callable[[Line, int], T]) -> T:
-        """Send what starts a motion, unless a stop comes first."""
-        self._link.check()
-        stops = self._link.line.stops
-        if self._stopped:
-            raise Refused(
-                "the machine was stopped", device=self._device, remedy="Enable the machine first."
-            )
-        try:
-            return await self._link.call(lambda line: start(line, stops))
-        except Refused as error:
-            if error.code == NOT_ENABLED:
-                await self._look_for_cause()
-            raise
-
-    async def _look_for_cause(self) -> None:
-        """Raise a servo's fault or a restart, if that is why the machine does not move."""
-        await self._link.call(lambda line: self.look(line, ANSWER_S))
-        self._link.check()
-
     async def reference(self) -> None:
         """Run the reference move; raises Refused, DriveFault, DeviceFault, Silence."""
         await self._started(lambda line, stops: line.command(f"FRF {self._axes[0]}", stops=stops))
@@ -194,8 +160,7 @@ class HexapodMotion:
         deadline = time.monotonic() + timeout
         while not await self._link.call(lambda line: line.ready() and not line.moving()):
             self._link.check()
-            self._need_time(deadline, timeout)
-            await asyncio.sleep(POLL_S)
+            await self._next_look(deadline, timeout)
         self._link.check()
 
     async def arrived(self, timeout: float) -> None:
@@ -208,8 +173,7 @@ class HexapodMotion:
                 raise await self._interrupted()
             if rests:
                 break
-            self._need_time(deadline, timeout)
-            await asyncio.sleep(POLL_S)
+            await self._next_look(deadline, timeout)
         # A controller that was stopped is on target, too: where it stands.
         if await self.target() != self._target:
             raise await self._interrupted()
@@ -217,22 +181,6 @@ class HexapodMotion:
     def _rests(self, line: Line) -> tuple[bool, bool]:
         servo = all(self._ask(line, "SVO?"))
         return servo, not line.moving() and all(self._ask(line, "ONT?"))
-
-    async def _interrupted(self) -> DeviceError:
-        await self._look_for_cause()
-        return DeviceFault(
-            "the motion was stopped before it reached its target",
-            device=self._device,
-            remedy="Enable the machine and command the pose again.",
-        )
-
-    def _need_time(self, deadline: float, timeout: float) -> None:
-        if time.monotonic() > deadline:
-            raise Silence(
-                f"the motion did not end within {timeout} s",
-                device=self._device,
-                remedy="Stop the machine and look at the legs.",
-            )
 
     # ------------------------------------------------------------ stopping
 
@@ -242,15 +190,6 @@ class HexapodMotion:
         async with confirmed(again, STILL_MOVING), within(STOP_S, self._device):
             await self._link.stop()
             await self._rest()
-
-    async def _rest(self) -> None:
-        deadline = time.monotonic() + REST_S
-        while await self._link.call(lambda line: line.moving()):
-            if time.monotonic() > deadline:
-                raise Silence(
-                    "the machine is still moving", device=self._device, remedy=STILL_MOVING
-                )
-            await asyncio.sleep(POLL_S)
 
 
 def _servo_off(device: str) -> DriveFault:
