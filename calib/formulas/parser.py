@@ -163,10 +163,11 @@ class _Parser:
         return Node("name", column, text)
 
     def indexed(self, text: str, column: int, bracket: int) -> Node:
-        """``s[leg4]`` or ``s[4]``: the same of a particular actuator."""
+        """``s[leg4]``, ``s["leg4"]`` or ``s[4]``: the same of a particular actuator."""
         kind, which, at = self.tokens[self.next]
-        good = kind == "name" or (kind == "number" and which.isdigit() and int(which) > 0)
-        if text not in OWN or not good:
+        which = which.strip("\"'") if kind == "text" else which
+        named = kind in ("name", "text") and bool(re.fullmatch(r"\w+", which))
+        if text not in OWN or not (named or (which.isdigit() and int(which) > 0)):
             what = f"{text} has no actuators" if text not in OWN else "no actuator is named"
             raise self.error(bracket, what)
         self.next += 1

@@ -53,6 +53,11 @@ def test_derivatives_agree_with_central_differences(formula):
         )
 
 
+@pytest.mark.parametrize("which", ['"leg4"', "'leg4'", "leg4"])
+def test_an_actuator_is_named_with_quotation_marks_or_without(which):
+    assert parse_expression(f"k * s[{which}]", "test").names == {"k": 1, "s[leg4]": 5}
+
+
 @pytest.mark.parametrize("formula", FORMULAS[:3])
 def test_values_agree_with_the_same_formula_in_python(formula):
     given = values(np.random.default_rng(6))
