@@ -34,6 +34,12 @@ __all__ = [
 
 CHUNK = 1024
 """Poses solved together: small enough that the working set stays in the cache."""
+LATE = 12
+"""Newton steps from home after which a closure is sought again, along the way there,"""
+STRIDES = 16
+"""in so many strides;"""
+FEW = 0.1
+"""but not where a larger part of the poses would take it: they belong to no such machine."""
 SETTLING = 12
 """Steps in which limbs settle at the stated home before the machine is closed."""
 
@@ -198,10 +204,36 @@ def forward(
         If the limbs do not hold the platform.
     """
     extension, held = np.asarray(extension), _columns(parameters, machine)
+    closed = _closed(machine, extension, held, start)
+    if start is not None:
+        return closed
+    late = np.flatnonzero(~closed.converged | (closed.iterations > LATE))
+    if not 0 < late.size <= max(1.0, FEW * closed.count):
+        return closed
+    own = held if held.shape[1] == 1 else held[:, late]
+    along = _followed(machine, extension[:, late], own)
+    reached = along.converged
+    order = np.arange(closed.count)
+    order[late[reached]] = closed.count + np.flatnonzero(reached)
+    return joined([closed, along]).take(order)
+
+
+def _closed(
+    machine: Machine, extension: Numbers, held: Numbers, start: Configuration | None
+) -> Configuration:
     kernel = _kernel(machine, extension, held, start)
     if kernel is None:
         return _solve(machine, extension, None, held, start)
     return kernel.solve(held, extension, None, None, _start(machine, False, start))
+
+
+def _followed(machine: Machine, extension: Numbers, held: Numbers) -> Configuration:
+    """Close at ``extension`` (n, N) by strides from home: assembled as it is there."""
+    at = home_configuration(machine)
+    begin = at.extension
+    for part in np.linspace(0.0, 1.0, STRIDES + 1)[1:]:
+        at = _closed(machine, begin + part * (extension - begin), held, at)
+    return at
 
 
 def inverse(
