@@ -214,7 +214,7 @@ def _finding(judged: Round, index: int, evidence: float) -> Finding:
     signature, number, trial = signature_of(scores, index)
     fall, dof = scores.fall(index, number, trial)
     beta, covariance = scores.estimate(index, trial, candidate.hypotheses[0])
-    sigmas = np.sqrt(np.diag(covariance))
+    sigmas = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     return Finding(
         index=index,
         name=candidate.name,

@@ -199,7 +199,7 @@ def _places(machine: Machine, run: Run) -> tuple[list[Run], list[Remark], _Known
                 break
             best = _best(places, HYPOTHESES)
             if not remarks:
-                check_conventions(machine, run, places, 0 if best is None else best.explained)
+                check_conventions(machine, run, places, _surely(machine, places, best))
         if best is None:
             break
         meant, remark = best.take()
@@ -219,6 +219,20 @@ def _despite_slack(places: Places) -> Proposal | None:
         return None
     best = _best(strict, OF_TABLES)
     return best if best is not None and best.explained >= NEARLY * strict.rows.count else None
+
+
+def _surely(machine: Machine, places: Places, best: Proposal | None) -> int:
+    """How many readings the best proposal explains; none where it does by a wide slack alone.
+
+    A wrong record makes a machine seem off by centimetres; then almost anything explains it.
+    """
+    if best is None:
+        return 0
+    if places.strict is places:
+        return best.explained
+    meant = places_of(machine, best.take()[0])
+    stand = 0 if meant is None else meant.strict.standing
+    return best.explained if stand >= NOWHERE * places.rows.count else 0
 
 
 def _best(places: Places, hypotheses: Sequence[_Hypothesis]) -> Proposal | None:

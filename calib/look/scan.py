@@ -128,7 +128,9 @@ def scan(fitted: Fit, columns: Array, *, early: bool = False) -> Scan:
 
 def freed(weights: Array, scores: Array) -> tuple[Array, Array]:
     """Fall s^T V^-1 s (n,) by columns of weights V (n, k, k) and scores s (n, k); sizes (n, k)."""
-    size = np.sqrt(np.maximum(np.einsum("nkk->nk", weights), 1e-300))
+    own = np.einsum("nkk->nk", weights)
+    least = np.maximum(1e-24 * own.max(axis=0, initial=0.0), 1e-300)  # of a column that is over
+    size = np.sqrt(np.maximum(own, least))
     scaled = weights / size[:, :, None] / size[:, None, :] + 1e-6 * np.eye(size.shape[1])
     beta = np.linalg.solve(scaled, (scores / size)[:, :, None])[:, :, 0]
     return np.sum(beta * scores / size, axis=1), beta / size

@@ -2,7 +2,7 @@
 
 import zlib
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 import pytest
@@ -14,8 +14,11 @@ from calib.effects import effect_named
 from calib.errors import BadInput
 from calib.identify.staged import fit_effects
 from calib.look import first_look
-from calib.look.first import rows_alone
+from calib.look.conventions import check_conventions
+from calib.look.first import _surely, rows_alone
 from calib.look.judged import record_of, settled
+from calib.look.places import places_of
+from calib.look.proposal import Proposal
 from calib.mechanism.rigid import exponential
 from calib.runs.record import Run
 from calib.runs.remark import lines_in_words, ranges
@@ -153,6 +156,27 @@ def test_what_would_be_another_machine_is_refused_in_words(name):
     machine = REFUSED[name]
     with pytest.raises(BadInput, match=MISTAKES[name].refused):
         looked(machine, spoiled(MISTAKES[name], name, made(machine, "pose-by-pose")))
+
+
+def test_what_only_a_wide_slack_bears_out_does_not_end_the_search():
+    machine, clean = machine_named("hexapod"), made("hexapod", "pose-by-pose")
+    q = clean.q.copy()
+    q[[1, 4]] = q[[4, 1]]
+    places = places_of(machine, replace(clean, q=q))
+    wide = replace(places, slack=60.0 * places.tight)
+    assert wide.standing > wide.strict.standing + wide.limit
+    useless, right = (
+        Proposal(places.rows.count, partial(tuple, (one, None)))
+        for one in (
+            wide.run,
+            clean,
+        )
+    )
+    assert _surely(machine, wide, useless) == 0
+    assert _surely(machine, wide, right) == places.rows.count
+    assert _surely(machine, places.strict, useless) == places.rows.count
+    with pytest.raises(BadInput, match="q2 and q5"):
+        check_conventions(machine, wide.run, wide, _surely(machine, wide, useless))
 
 
 @pytest.mark.long
