@@ -12,7 +12,8 @@ pose, in usual errors of the axes (B their displacements of the reading): a mach
 repeat.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -50,6 +51,11 @@ class Noise:
     by_row: bool = False
     step: float = 0.0
     scatter: Sizes = ()
+
+    @property
+    def stretched(self) -> bool:
+        """Whether all that there is, is another scale than stated."""
+        return self.tau_s <= 0.0 and self.visit <= 0.0 and not self.scatter
 
     @property
     def narrow(self) -> float:
@@ -95,7 +101,7 @@ class Taking:
             return np.full(self.run.size, 3.0)
         return np.asarray(self.live.sum(axis=0), dtype=np.float64)
 
-    @property
+    @cached_property
     def order(self) -> IntArray:
         """Readings as they followed each other, run by run."""
         return np.lexsort((self.time_s, self.run)).astype(np.intp)
@@ -106,13 +112,19 @@ class Taking:
         Readings with one time stamp were not taken at once: a twentieth of the usual gap stands
         between them. ``by_row``: the usual gap stands between all.
         """
+        return self._gaps[int(by_row)]
+
+    @cached_property
+    def _gaps(self) -> tuple[Array, Array]:
+        """In time, and by row."""
         run, time = self.run[self.order], self.time_s[self.order]
         gap = np.diff(time, prepend=time[:1])
         inside = np.diff(run, prepend=run[:1] - 1) == 0
         apart = gap[inside & (gap > 0.0)]
         usual = float(np.median(apart)) if apart.size else 1.0
-        gap = np.full_like(gap, usual) if by_row else np.maximum(gap, 0.05 * usual)
-        return np.where(inside, gap, np.inf)
+        each = (np.maximum(gap, 0.05 * usual), np.full_like(gap, usual))
+        in_time, by_row = (np.where(inside, one, np.inf) for one in each)
+        return in_time, by_row
 
     @property
     def usual_gap_s(self) -> float:
@@ -125,10 +137,6 @@ class Taking:
         """Duration of the longest run, s."""
         spans = [float(np.ptp(self.time_s[self.run == run])) for run in np.unique(self.run)]
         return max(spans, default=0.0)
-
-    def corrected(self, inverse: Array) -> "Taking":
-        """The same readings in other sigmas: whitened by ``inverse`` (3, 3, A) once more."""
-        return replace(self, motions=np.einsum("ijn,ujn->uin", inverse, self.motions))
 
     def variance_by_visit(self, noise: Noise) -> Array:
         """Covariance (3, 3, A) of the whitened readings by the machine's repeatability alone."""

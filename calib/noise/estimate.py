@@ -13,20 +13,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.arrays import Array
 from calib.chance import chi2_above
 from calib.evidence.problem import LinearProblem
 from calib.noise.component import WHITE, Noise, Taking
 from calib.noise.likelihood import Likelihood, spread
 from calib.noise.scatter import tails, uneven
 from calib.noise.score import promising
+from calib.noise.sizes import FAINT, Sizes, joined, settled
 
 DEMANDED = 1.5
 """Rise of the log likelihood from which a component counts in judging what else is missing."""
 RESCALED = 4.8
 """The same of the scale of the stated sigmas: these are trusted unless clearly wrong."""
-FAINT = 0.3
-"""The same below which a component is not tried again beside others."""
 UNEVEN = 5.41
 """The same of one component of scatter (p 0.001); of many, more by the log of how many."""
 SHARED = 2.0
@@ -84,25 +82,25 @@ def estimate(problem: LinearProblem, taking: Taking) -> Found:
     """
     likelihood = Likelihood(problem, taking)
     bar = _Bar(likelihood)
-    now = white = _Sizes((), (), likelihood.of(WHITE))
+    now = white = Sizes((), (), likelihood.of(WHITE))
     gains: dict[str, float] = {}
     found = promising(*likelihood.left(WHITE), taking)
     left = [part for part in PARTS if ("time" if part in TIED else part) in found]
     while True:
         fading = [part for part in left if part not in WANDERING]
-        offers = {part: _joined(likelihood, now, part) for part in fading}
+        offers = {part: joined(likelihood, now, part) for part in fading}
         if any(now.value - offers[part].value > DEMANDED for part in FADING if part in offers):
-            offers |= {part: _joined(likelihood, now, part) for part in WANDERING}
+            offers |= {part: joined(likelihood, now, part) for part in WANDERING}
         plain = tuple(offers)
-        offers |= {part: _joined(likelihood, now, part) for part in _pointed(likelihood, now, bar)}
+        offers |= {part: joined(likelihood, now, part) for part in _pointed(likelihood, now, bar)}
         if now.parts:
             first = sorted(offers, key=lambda part: offers[part].value + bar.price(part))
-            offers |= {part: _settled(likelihood, offers[part]) for part in first[:CLOSEST]}
+            offers |= {part: settled(likelihood, offers[part]) for part in first[:CLOSEST]}
         rise = {part: now.value - offer.value for part, offer in offers.items()}
         over = {
             part: rise[part] - bar.price(part)
             for part, offer in offers.items()
-            if rise[part] > bar.of(part, offer)
+            if bar.passed(part, offer, rise[part])
         }
         if not over:
             break
@@ -111,7 +109,7 @@ def estimate(problem: LinearProblem, taking: Taking) -> Found:
         taken = TIED if best in TIED else (best,)
         left = [part for part in plain if part not in taken and rise[part] > FAINT]
     if set(FADING) & set(now.parts):
-        wider = _settled(likelihood, _joined(likelihood, now, "share"))
+        wider = settled(likelihood, joined(likelihood, now, "share"))
         now = wider if now.value - wider.value > SHARED else now
     now = _pruned(likelihood, now, bar)
     if not now.parts:
@@ -143,11 +141,12 @@ class _Bar:
         """Those that are of single readings' scatter."""
         return [part for part in parts if part in self._uneven]
 
-    def of(self, part: str, offer: "_Sizes") -> float:
-        """Rise from which a component counts that has led to ``offer``."""
+    def passed(self, part: str, offer: Sizes, rise: float) -> bool:
+        """Whether a component counts that has led to ``offer`` by such a rise."""
         if part not in self._uneven:
-            return self._needed(part)
-        return (UNEVEN + self.chosen) * self.heavy(offer)
+            return rise > self._needed(part)
+        needed = UNEVEN + self.chosen
+        return rise > needed and rise > needed * self.heavy(offer)
 
     @staticmethod
     def _needed(part: str) -> float:
@@ -157,10 +156,9 @@ class _Bar:
         """What a rise counts less by, where several components would do."""
         return DEMANDED + self.chosen if part in self._uneven else self._needed(part)
 
-    def heavy(self, sizes: "_Sizes") -> float:
+    def heavy(self, sizes: Sizes) -> float:
         """Variance of the readings' squares over that of normal ones."""
-        residual, _ = self._likelihood.left(self._likelihood.noise(sizes.parts, sizes.logs))
-        return tails(residual)
+        return tails(self._likelihood.residual(self._likelihood.noise(sizes.parts, sizes.logs)))
 
     def chance(self, part: str, gain: float, heavy: float) -> float:
         """Probability of such a rise where there is none of it.
@@ -173,7 +171,7 @@ class _Bar:
         return min(1.0, len(self._uneven) * sides * float(chi2_above(1.0, 2.0 * gain / heavy)))
 
 
-def _pointed(likelihood: Likelihood, now: "_Sizes", bar: _Bar) -> list[str]:
+def _pointed(likelihood: Likelihood, now: Sizes, bar: _Bar) -> list[str]:
     """Components of scatter that a score test points to, beside what there is."""
     names = [part for part in likelihood.uneven if part not in now.parts]
     if not names:
@@ -189,72 +187,18 @@ def _pointed(likelihood: Likelihood, now: "_Sizes", bar: _Bar) -> list[str]:
     return [names[k] for k in ranked if told[k] > POINTED]
 
 
-def _pruned(likelihood: Likelihood, now: "_Sizes", bar: _Bar) -> "_Sizes":
+def _pruned(likelihood: Likelihood, now: Sizes, bar: _Bar) -> Sizes:
     """Without the overall scale, or one of scatter, that others have made superfluous."""
     own = [part for part in now.parts if part == "scale" or part in bar.own(now.parts)]
     for part in own if len(own) > 1 else ():
-        kept = [k for k, name in enumerate(now.parts) if name != part]
-        parts = tuple(now.parts[k] for k in kept)
-        logs = tuple(now.logs[k] for k in kept)
-        less = _settled(likelihood, _Sizes(parts, logs, likelihood.at(parts, logs)))
-        if less.value - now.value < bar.of(part, now):
+        less = settled(likelihood, now.without(likelihood, part))
+        if not bar.passed(part, now, less.value - now.value):
             now = less
     return now
 
 
-@dataclass(frozen=True)
-class _Sizes:
-    """Components, logs of their sizes, and -log L there."""
-
-    parts: tuple[str, ...]
-    logs: tuple[float, ...]
-    value: float
-
-
-def _joined(likelihood: Likelihood, now: _Sizes, part: str) -> _Sizes:
-    """One component more at its most likely size, the others as they are."""
-    parts = (*now.parts, part)
-    low, high = likelihood.low[part], likelihood.high[part]
-    grid = np.linspace(low, high, 6)
-    values = [likelihood.at(parts, (*now.logs, one)) for one in grid]
-    at = int(np.argmin(values))
-    from scipy import optimize  # slow to import: only where noise is estimated
-
-    found = optimize.minimize_scalar(
-        lambda one: likelihood.at(parts, (*now.logs, float(one))),
-        bounds=(float(grid[max(at - 1, 0)]), float(grid[min(at + 1, grid.size - 1)])),
-        method="bounded",
-        options={"xatol": 0.04, "maxiter": 9},
-    )
-    return _Sizes(parts, (*now.logs, float(found.x)), float(found.fun))
-
-
-def _settled(likelihood: Likelihood, near: _Sizes) -> _Sizes:
-    """All components together at their most likely sizes."""
-    from scipy import optimize  # slow to import: only where noise is estimated
-
-    if not near.parts:
-        return near
-
-    def value(logs: Array) -> float:
-        return likelihood.at(near.parts, logs.tolist())
-
-    start = np.array(near.logs)
-    best: Array = optimize.fmin(
-        value,
-        start,
-        initial_simplex=start + np.vstack([np.zeros(start.size), 0.3 * np.eye(start.size)]),
-        xtol=0.03,
-        ftol=0.03,
-        maxfun=36,
-        disp=False,
-    )
-    together = _Sizes(near.parts, tuple(best.tolist()), value(best))
-    return together if together.value < near.value else near
-
-
 def _components(
-    likelihood: Likelihood, now: _Sizes, gains: dict[str, float], bar: _Bar
+    likelihood: Likelihood, now: Sizes, gains: dict[str, float], bar: _Bar
 ) -> tuple[Component, ...]:
     """Values with uncertainties from the curvature of log L, and p by the likelihood ratio.
 

@@ -20,7 +20,7 @@ from calib.evidence.problem import LinearProblem
 from calib.noise.component import Noise, Taking
 from calib.noise.scatter import Scatter
 from calib.noise.whitening import Whitening
-from calib.scaled import Scaled, normal_matrix
+from calib.scaled import Scaled
 
 WANDERED = 10.0
 """Time constant of what wanders, in lengths of a run: within the run it does not fade."""
@@ -32,8 +32,10 @@ class Likelihood:
     """-log L of one problem, without its constant, by the components' names and logs of sizes."""
 
     def __init__(self, problem: LinearProblem, taking: Taking) -> None:
-        self._residual = problem.residual.reshape(1, 3, -1)
-        self._jacobian = problem.jacobian.reshape(problem.jacobian.shape[0], 3, -1)
+        every = np.vstack([problem.jacobian, problem.residual])
+        self._rows = np.ascontiguousarray(every.reshape(len(every), 3, -1).transpose(2, 1, 0))
+        """Derivatives and, last, the residual, reading by reading (A, 3, p + 1)."""
+        self._products = _products(self._rows)
         self._precision = problem.prior_precision
         self._pull = problem.held_back
         self.taking = taking
@@ -82,25 +84,42 @@ class Likelihood:
 
     def of(self, noise: Noise) -> float:
         """-log L with some noise."""
-        whitening, jacobian, residual = self._whitened(noise)
-        normal = Scaled.of(normal_matrix(jacobian, self._precision), least=1e-12)
-        step = normal.half_solved(jacobian @ residual - self._pull)
+        whitening = Whitening(self.taking, noise)
+        if noise.stretched:
+            products = self._products / noise.scale**2
+        else:
+            products = _products(whitening.by_reading(self._rows))
+        normal, step = self._step(products)
         log_normal = 2.0 * float(np.sum(np.log(np.diag(normal.factor)) - np.log(normal.scale)))
-        square = float(residual @ residual) - float(step @ step)
+        square = float(products[-1, -1]) - float(step @ step)
         return 0.5 * (whitening.log_det + log_normal + square)
 
     def left(self, noise: Noise) -> tuple[Array, Array]:
         """Residuals (3, A) of the fit with some noise, made white, and its G (p, 3, A)."""
-        _, jacobian, residual = self._whitened(noise)
-        normal = Scaled.of(normal_matrix(jacobian, self._precision), least=1e-12)
-        absorbed = normal.half_solved(jacobian)
-        step = normal.half_solved(jacobian @ residual - self._pull)
-        return (residual - step @ absorbed).reshape(3, -1), absorbed.reshape(step.size, 3, -1)
+        rows = Whitening(self.taking, noise).by_reading(self._rows)
+        normal, step = self._step(_products(rows))
+        absorbed = normal.half_solved(rows[..., :-1].reshape(-1, step.size).T)
+        residual = rows[..., -1].reshape(-1) - step @ absorbed
+        absorbed = absorbed.reshape(step.size, -1, 3).swapaxes(1, 2)
+        return residual.reshape(-1, 3).T, np.ascontiguousarray(absorbed)
 
-    def _whitened(self, noise: Noise) -> tuple[Whitening, Array, Array]:
-        whitening = Whitening(self.taking, noise)
-        jacobian = whitening.apply(self._jacobian).reshape(self._jacobian.shape[0], -1)
-        return whitening, jacobian, whitening.apply(self._residual).reshape(-1)
+    def residual(self, noise: Noise) -> Array:
+        """The residuals (3, A) alone."""
+        rows = Whitening(self.taking, noise).by_reading(self._rows)
+        normal, step = self._step(_products(rows))
+        return np.asarray((rows[..., -1] - rows[..., :-1] @ normal.half_solved_back(step)).T)
+
+    def _step(self, products: Array) -> tuple[Scaled, Array]:
+        """N = L L^T, and L^-1 times the slope, of products (p + 1, p + 1) of white columns."""
+        normal = products[:-1, :-1] + np.diag(self._precision)
+        scaled = Scaled.of(normal, least=1e-12)
+        return scaled, scaled.half_solved(products[:-1, -1] - self._pull)
+
+
+def _products(rows: Array) -> Array:
+    """Columns (A, 3, k) times one another, (k, k)."""
+    flat = rows.reshape(-1, rows.shape[2])
+    return np.asarray(flat.T @ flat)
 
 
 def _askable(taking: Taking) -> tuple[str, ...]:
@@ -131,19 +150,19 @@ def spread(
     """Standard deviations of ``sums`` (k, n) of the logs by second differences; inf where flat."""
     size, width = len(parts), 0.1
     moves = width * np.eye(size)
-    centre = likelihood.at(parts, logs)
     at = np.array(logs)
-    curvature = np.zeros((size, size))
+
+    def value(move: Array) -> float:
+        return likelihood.at(parts, tuple(at + move))
+
+    centre = value(np.zeros(size))
+    single = np.array([value(move) + value(-move) - 2.0 * centre for move in moves])
+    curvature = np.diag(single)
     for i in range(size):
-        ahead, back = (likelihood.at(parts, tuple(at + s * moves[i])) for s in (1.0, -1.0))
-        curvature[i, i] = (ahead + back - 2.0 * centre) / width**2
         for j in range(i):
-            corners = [
-                s * t * likelihood.at(parts, tuple(at + s * moves[i] + t * moves[j]))
-                for s in (1.0, -1.0)
-                for t in (1.0, -1.0)
-            ]
-            curvature[i, j] = curvature[j, i] = sum(corners) / (4.0 * width**2)
+            both = value(moves[i] + moves[j]) + value(-moves[i] - moves[j]) - 2.0 * centre
+            curvature[i, j] = curvature[j, i] = 0.5 * (both - single[i] - single[j])
+    curvature /= width**2
     values, vectors = np.linalg.eigh(curvature)
     variance = np.where(values > 1e-9, 1.0 / np.maximum(values, 1e-9), np.inf)
     seen = [float(np.sum(row[row != 0] ** 2 * variance[row != 0])) for row in sums @ vectors]

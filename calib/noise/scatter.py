@@ -88,13 +88,25 @@ class Scatter:
                 total = total + size**2 * self.added[name]
         return np.asarray(total)
 
-    def root(self, sizes: Sizes, live: BoolArray | None = None) -> Array:
-        """Lower triangular factors (A, 3, 3) of M, of components (3, A) that are held alone."""
-        blocks = self.covariance(sizes)
+    def roots(self, sizes: Sizes, live: BoolArray | None = None) -> tuple[Array, Array]:
+        """Lower triangular factors (A, 3, 3) of M, where components are held, and their inverses.
+
+        ``live`` (3, A) says which are, if not all; the others stay as they are.
+        """
+        M = self.covariance(sizes)
         if live is not None:
-            blocks = np.where(live[:, None] & live, blocks, np.eye(3)[:, :, None])
-        factors = np.linalg.cholesky(np.moveaxis(blocks, -1, 0))
-        return np.asarray(factors, dtype=np.float64)
+            M = np.where(live[:, None] & live, M, np.eye(3)[:, :, None])
+        root, inverse = np.zeros((2, M.shape[2], 3, 3))
+        root[:, 0, 0] = a = np.sqrt(M[0, 0])
+        root[:, 1, 0] = b = M[1, 0] / a
+        root[:, 2, 0] = c = M[2, 0] / a
+        root[:, 1, 1] = d = np.sqrt(M[1, 1] - b**2)
+        root[:, 2, 1] = e = (M[2, 1] - c * b) / d
+        root[:, 2, 2] = f = np.sqrt(M[2, 2] - c**2 - e**2)
+        inverse[:, 0, 0], inverse[:, 1, 1], inverse[:, 2, 2] = 1.0 / a, 1.0 / d, 1.0 / f
+        inverse[:, 1, 0], inverse[:, 2, 1] = -b / (a * d), -e / (d * f)
+        inverse[:, 2, 0] = (b * e / d - c) / (a * f)
+        return root, inverse
 
 
 def blocks_left(absorbed: Array, live: BoolArray | None) -> Array:

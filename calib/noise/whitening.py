@@ -24,6 +24,8 @@ from calib.noise.filtering import Filters, Layout, filters, innovations
 
 ABREAST = 64
 """Columns that are filtered together: memory is that of so many, whatever their number."""
+TOGETHER = 128
+"""Readings that are taken together: what is between is not written to the memory and read again."""
 
 
 class Whitening:
@@ -39,10 +41,9 @@ class Whitening:
         self._count = taking.run.size
         self._noise = noise
         self._own: Array | None = None
-        own_log_det = 0.0
+        roots, own_log_det = None, 0.0
         if noise.scatter:
-            root = taking.scatter.root(noise.scatter, taking.live)
-            self._own = np.ascontiguousarray(np.moveaxis(np.linalg.inv(root), 0, -1))
+            roots = root, self._own = taking.scatter.roots(noise.scatter, taking.live)
             own_log_det = 2.0 * float(np.sum(np.log(np.diagonal(root, axis1=1, axis2=2))))
         self._plain = noise.tau_s <= 0.0 and noise.visit <= 0.0
         self._layout: Layout | None = None
@@ -57,10 +58,7 @@ class Whitening:
             self.log_det = 2.0 * float(held @ np.log(noise.scale * left))
         else:
             layout = _laid_out(taking, noise.tau_s > 0.0, noise.visit > 0.0)
-            if self._own is not None and noise.visit > 0.0:
-                layout = _corrected(layout, taking, self._own)
-            self._layout = layout
-            self._filters = _filters(taking, layout, noise)
+            self._layout, self._filters = _filtering(taking, layout, noise, roots)
             logs = np.log(self._filters.spread[layout.there])
             if taking.live is not None:
                 logs = logs * taking.live[:, layout.reading[layout.there]].T
@@ -69,39 +67,57 @@ class Whitening:
 
     def apply(self, columns: Array) -> Array:
         """Columns (..., 3, A) of whitened components, made white; each stays in its place."""
-        if self._own is not None:
-            columns = _times(self._own, columns)
-        if self._plain:
+        if self._plain and self._own is None:
             return columns / self._noise.scale if self._noise.scale != 1.0 else columns
         flat = columns.reshape(-1, 3, self._count)
-        if self._chain is not None:
-            order, rho = self._chain
-            out = np.empty_like(flat)
-            before = flat[:, :, np.concatenate([order[:1], order[:-1]])]
-            left = self._noise.scale * np.sqrt(1.0 - rho**2)
-            out[:, :, order] = (flat[:, :, order] - rho * before) / left
-            return out.reshape(columns.shape)
-        assert self._layout is not None
-        parts = [
-            self._filtered(self._layout, flat[k : k + ABREAST])
-            for k in range(0, flat.shape[0], ABREAST)
-        ]
-        return np.concatenate(parts).reshape(columns.shape) if parts else columns
+        out = np.empty_like(flat)
+        for first in range(0, flat.shape[0], ABREAST):
+            part = slice(first, first + ABREAST)
+            rows = np.ascontiguousarray(flat[part].transpose(2, 1, 0))
+            out[part] = self.by_reading(rows).transpose(2, 1, 0)
+        return out.reshape(columns.shape)
 
-    def _filtered(self, layout: Layout, flat: Array) -> Array:
-        """Innovations of columns (k, 3, A)."""
-        rows = np.ascontiguousarray(np.moveaxis(flat, 0, -1).swapaxes(0, 1))
-        out = innovations(layout, self._filters, rows)
-        return np.asarray(np.moveaxis(out.swapaxes(0, 1), -1, 0))
+    def by_reading(self, rows: Array) -> Array:
+        """The same of columns that lie reading by reading, (A, 3, k)."""
+        if self._layout is not None:
+            return innovations(self._layout, self._filters, rows)
+        if self._own is not None:
+            rows = _times(self._own, rows)
+        if self._plain:
+            return rows / self._noise.scale if self._noise.scale != 1.0 else rows
+        assert self._chain is not None
+        order, rho = self._chain
+        left = 1.0 / (self._noise.scale * np.sqrt(1.0 - rho**2))
+        out = np.empty_like(rows)
+        for first in range(0, order.size, TOGETHER):
+            part = slice(first, first + TOGETHER)
+            before = rows[order[np.arange(first - 1, order[part].size + first - 1)]]
+            before *= (-left * rho)[part, None, None]
+            before += left[part, None, None] * rows[order[part]]
+            out[order[part]] = before
+        return out
 
 
-def _times(lower: Array, columns: Array) -> Array:
-    """Lower triangular matrices (3, 3, A) times columns (..., 3, A)."""
+def _times(lower: Array, rows: Array) -> Array:
+    """Lower triangular matrices (A, ..., 3, 3) times rows (A, ..., 3, k)."""
+    out = np.empty_like(rows)
+    for first in range(0, len(rows), TOGETHER):
+        part = slice(first, first + TOGETHER)
+        for row in range(3):
+            own = out[part, ..., row, :]
+            np.multiply(lower[part, ..., row, 0, None], rows[part, ..., 0, :], out=own)
+            for other in range(1, row + 1):
+                own += lower[part, ..., row, other, None] * rows[part, ..., other, :]
+    return out
+
+
+def _by(columns: Array, lower: Array) -> Array:
+    """Columns (..., k, 3) times lower triangular matrices (..., 3, 3)."""
     out = np.empty_like(columns)
-    for row in range(3):
-        out[..., row, :] = lower[row, 0] * columns[..., 0, :]
-        for other in range(1, row + 1):
-            out[..., row, :] += lower[row, other] * columns[..., other, :]
+    for k in range(3):
+        np.multiply(columns[..., 2], lower[..., 2, None, k], out=out[..., k])
+        for other in range(k, 2):
+            out[..., k] += columns[..., other] * lower[..., other, None, k]
     return out
 
 
@@ -134,12 +150,26 @@ def _moved(taking: Taking, reading: IntArray, there: BoolArray) -> Array:
     return np.asarray(motions * (there & (taking.visit[reading] >= 0))[..., None, None])
 
 
-def _corrected(layout: Layout, taking: Taking, inverse: Array) -> Layout:
-    """The same sequences of readings that are whitened by ``inverse`` (3, 3, A) once more."""
-    seen = layout.seen.copy()
-    first = seen.shape[3] - taking.motions.shape[0]
-    seen[..., first:] = _moved(taking.corrected(inverse), layout.reading, layout.there)
-    return replace(layout, seen=seen)
+def _filtering(
+    taking: Taking, layout: Layout, noise: Noise, roots: tuple[Array, Array] | None
+) -> tuple[Layout, Filters]:
+    """Filter of readings that the inverse W of a root (A, 3, 3 each) whitens first, if given.
+
+    With y' = W y the innovation S^-1/2 (y' - H' x) is S^-1/2 W (y - W^-1 H' x): readings are
+    taken as they are, and only what the filter knows of each is changed.
+    """
+    if roots is None:
+        return layout, _filters(taking, layout, noise)
+    first = 3 if noise.tau_s > 0.0 else 0
+    root, own = (one[layout.reading] for one in roots)
+    seen, raw = layout.seen.copy(), layout.seen
+    seen[..., first:] = _times(own, layout.seen[..., first:])
+    found = _filters(taking, replace(layout, seen=seen), noise)
+    if first:
+        raw = raw.copy()
+        raw[..., :first] = root * layout.there[..., None, None]
+    gain, white = _by(found.gain, own), _by(found.white, own)
+    return replace(layout, seen=raw), replace(found, gain=gain, white=white)
 
 
 def _filters(taking: Taking, layout: Layout, noise: Noise) -> Filters:

@@ -37,7 +37,7 @@ def read(taking: Taking, noise: Noise, rng: np.random.Generator, freedom: float 
     drawn = rng.standard_normal((3, COUNT))
     if freedom:
         drawn = rng.standard_t(freedom, (3, COUNT)) / np.sqrt(freedom / (freedom - 2.0))
-    root = taking.scatter.root(noise.scatter)
+    root, _ = taking.scatter.roots(noise.scatter)
     noisy = noise.scale * np.einsum("nij,jn->in", root, drawn).reshape(-1)
     jacobian = rng.standard_normal((UNKNOWNS, 3 * COUNT))
     gone = np.linalg.lstsq(jacobian.T, noisy, rcond=None)[0]

@@ -5,9 +5,9 @@ import pytest
 
 from calib.noise import Noise
 from calib.noise.component import WHITE
-from calib.noise.estimate import _joined, _Sizes
 from calib.noise.likelihood import Likelihood
 from calib.noise.score import promising
+from calib.noise.sizes import Sizes, joined
 from tests.noise.test_noise_estimate import lab
 
 SAID = {"correlated": "time", "visit": "visit", "scale": "scale"}
@@ -20,7 +20,7 @@ def test_whatever_would_rise_is_asked_for(seed):
     white = likelihood.of(WHITE)
     pointed = promising(*likelihood.left(WHITE), taking)
     for part, said in SAID.items():
-        rise = white - _joined(likelihood, _Sizes((), (), white), part).value
+        rise = white - joined(likelihood, Sizes((), (), white), part).value
         assert said in pointed or rise < (2.5 if part == "scale" else 0.5)
 
 
