@@ -75,7 +75,9 @@ class RunDiagnosis:
         left = linear.whitened - np.tensordot(step, jacobian, axes=1)
         natural = rows.in_mm(left[:, accepted], accepted)
         told = rows.in_millimetres[:, accepted].any(axis=0)
-        held = hold_out_of(fitted, linear.whitened, jacobian, precision, pull, accepted)
+        held = hold_out_of(
+            fitted, linear.whitened, jacobian, precision, pull, accepted, floor=False
+        )
         values = np.where(linear_among(one.unknowns), step[-sigma.size :], values)
         return Outlook(
             rms_mm=float(np.sqrt(np.sum(natural**2) / max(told.sum(), 1))),

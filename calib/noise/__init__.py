@@ -6,6 +6,7 @@ components that the readings themselves demand.
 """
 
 from calib.noise.component import WHITE, Noise, Taking
+from calib.noise.drawn import drawn
 from calib.noise.estimate import Component, Found, estimate, points_to_scatter
 from calib.noise.scatter import Scatter
 from calib.noise.whitening import Whitening
@@ -18,6 +19,7 @@ __all__ = [
     "Scatter",
     "Taking",
     "Whitening",
+    "drawn",
     "estimate",
     "points_to_scatter",
 ]
