@@ -79,12 +79,16 @@ class CarrierEntry(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class UnexplainedEntry(Record):
-    """What no known effect explains, and on which columns it depends, strongest first."""
+    """What no known effect explains, and on which columns it depends, strongest first.
+
+    ``p_value`` is that of the strongest structure there is, significant or not.
+    """
 
     significant: bool
     channels: tuple[str, ...]
     periods: Mapping[str, float] = field(default_factory=dict)
     carriers: tuple[CarrierEntry, ...] = ()
+    p_value: float = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)

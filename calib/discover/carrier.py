@@ -1,25 +1,49 @@
 """What moves by structure of unknown origin, how far, how often and which way."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from calib.discover.problem import LEGS
 from calib.evidence.findings import Dependence
+from calib.identify.fitting import Fit
 
 ONE_WAY = 0.9
 """Part of a wave's power along one direction from which it is said to go one way."""
 
 
-def carriers(dependences: tuple[Dependence, ...]) -> list[dict[str, Any]]:
-    """Entry ``carriers``: one for each dependence that has one, strongest first."""
-    return [_entry(one) for one in dependences if one.carrier]
+def carriers(dependences: tuple[Dependence, ...], axes: Sequence[str]) -> list[dict[str, Any]]:
+    """Entry ``carriers``: one for each dependence that has one, strongest first.
+
+    ``axes`` are the names of the machine's actuators.
+    """
+    return [_entry(one, axes) for one in dependences if one.carrier]
 
 
-def _entry(one: Dependence) -> dict[str, Any]:
+def axes_of(fit: Fit) -> list[str]:
+    """Names of the machine's actuators."""
+    return [axis.name for axis in fit.model.machine.axes]
+
+
+def mover(one: Dependence, axes: Sequence[str]) -> str:
+    """What moves: the one actuator, by its name, where one alone acts."""
+    if not one.carrier.startswith("leg"):
+        return one.carrier
+    acting = {name.removeprefix(f"{one.channel}.").split(".")[0] for name in one.acting}
+    if one.carrier != LEGS:
+        acting = {one.carrier}
+    numbers = {name.removeprefix(LEGS).removeprefix("leg") for name in acting}
+    if len(numbers) != 1 or not (number := numbers.pop()).isdigit():
+        return one.carrier
+    return axes[int(number) - 1]
+
+
+def _entry(one: Dependence, axes: Sequence[str]) -> dict[str, Any]:
     size, direction = motion(one)
     return {
         "channel": one.channel,
-        "moves": one.carrier,
+        "moves": mover(one, axes),
         "period": one.period,
         "amplitude": size,
         "unit": one.unit,
@@ -47,13 +71,14 @@ def motion(one: Dependence) -> tuple[float | None, list[float] | None]:
     return float(sizes[0]), [float(each) for each in along]
 
 
-def motion_words(one: Dependence) -> str:
-    """How far and which way, after the period; empty where there is nothing to say."""
+def motion_words(one: Dependence, axes: Sequence[str]) -> str:
+    """How far what moves, and which way, after the period; empty where there is nothing to say."""
     size, direction = motion(one)
     if size is None:
         return ""
     length = f"{1000.0 * size:.2g} um" if one.unit == "mm" else f"{size:.2g} {one.unit}"
     if direction is None:
-        return f", {length}"
+        which = mover(one, axes)
+        return f", {length} of {which}" if which in axes else f", {length}"
     where = ", ".join(f"{each:.2f}" for each in direction)
     return f", {length} along one direction of the tracker frame ({where})"

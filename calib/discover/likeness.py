@@ -1,5 +1,6 @@
 """How much of what is missing known effects explain, where they do not explain all of it."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,8 @@ from calib.evidence.forward import Discovery
 
 ALIKE = 0.5
 """Likeness from which an effect is spoken of."""
+NEARLY_ALL = 0.95
+"""Likeness from which what was found is not questioned: what is left is little beside it."""
 
 
 def excess(diagnosis: Diagnosis) -> float:
@@ -46,9 +49,14 @@ def likeness_of_found(discovery: Discovery) -> dict[str, Any] | None:
     return {"effects": added, "value": value}
 
 
-def likeness_words(likeness: dict[str, Any] | None, depends: str) -> str:
-    """``It is like X (0.7), but not X: it depends on q3``; empty without a likeness."""
+def likeness_words(likeness: dict[str, Any] | None, depends: str, held: Sequence[str] = ()) -> str:
+    """``It is like X (0.7), but not X: it depends on q3``; empty without a likeness.
+
+    ``held`` is what the model has: nearly all of what was missing, it is what it was called.
+    """
     if likeness is None:
         return ""
-    names = " with ".join(likeness["effects"])
+    names, value = " with ".join(likeness["effects"]), likeness["value"]
+    if value >= NEARLY_ALL and set(likeness["effects"]) <= set(held):
+        return f" Of what was missing {names} explains {100.0 * value**2:.0f} %."
     return f" It is like {names} ({likeness['value']:.1f}), but not {names}: {depends}."

@@ -18,7 +18,7 @@ from calib.identify.fitting import Fit
 from calib.identify.signatures import EffectColumns
 from calib.mechanism.rigid import rotate, to_euler
 
-TIMES_Q = " times q"
+LEGS, TIMES_Q = "legs", " times q"
 """What moves along with an actuator's own coordinate, in the name of what is moved."""
 MANY = 400
 """Periods in time that are tried at most for what moves all points alike."""
@@ -61,7 +61,7 @@ def every_leg(fit: Fit) -> Response:
     axes = fit.model.rows.machine.axes
     columns = accepted(fit, fit.linear.situation.actuator_columns)
     units = tuple(axis.unit for axis in axes)
-    return Response("legs", columns, units, tuple(axis.usual_error for axis in axes))
+    return Response(LEGS, columns, units, tuple(axis.usual_error for axis in axes))
 
 
 def each_leg(fit: Fit) -> list[Response]:

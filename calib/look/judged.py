@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from calib.effects.component import Effect
 from calib.identify.fitting import Fit
 from calib.identify.readings import MASKED, BadReading
 from calib.identify.starting import MOVED
+from calib.identify.taking import noise_covariance
 from calib.look.carried import as_fitted
 from calib.look.places import PART
 from calib.look.strays import groups
@@ -27,6 +29,8 @@ NOTICEABLE = 0.2
 """Part of its usual size from which on a sign counts."""
 TOO_LARGE = 300.0
 """Times its usual size that no machine has; and the part of it that nobody can have seen."""
+STRAY = 23.5
+"""Squared sigmas, of three components, beyond which a reading is a stray (p = 3e-5)."""
 NOBODY = 400.0
 """Chi-square per degree of freedom that no fit has that could be meant."""
 BEYOND = 20.0
@@ -83,7 +87,8 @@ def settled(remarks: Sequence[Remark]) -> bool:
 
 def _left_out(fitted: Fit, explained: Collection[int]) -> Iterator[Remark]:
     """More readings excluded than strays are, beside those explained: never silently."""
-    bad = [one for one in fitted.bad if one.why != MASKED and one.row not in explained]
+    left = [one for one in fitted.bad if one.why != MASKED and one.row not in explained]
+    bad = _beyond_noise(fitted, left)
     if not bad:
         return
     rows = fitted.model.rows
@@ -98,7 +103,7 @@ def _left_out(fitted: Fit, explained: Collection[int]) -> Iterator[Remark]:
     yield Remark(
         "many-excluded",
         f"{out.size} of {fitted.readings + out.size} readings ({100 * part:.0f} %) are excluded"
-        f"{of}: {_why(bad)}",
+        f"{of}: {_why(bad)}{_of_one_nest(fitted, out)}",
         lines,
         f"Excluded: {lines_in_words(lines)}",
         "The fit is of the other readings; it is not called adequate",
@@ -106,6 +111,21 @@ def _left_out(fitted: Fit, explained: Collection[int]) -> Iterator[Remark]:
         False,
         run.source,
     )
+
+
+def _beyond_noise(fitted: Fit, bad: Sequence[BadReading]) -> list[BadReading]:
+    """Those that are strays by the noise that was found, too: one nest may scatter more."""
+    noise = replace(fitted.noise, scale=fitted.noise.narrow)
+    if noise.scale == 1.0 and not noise.scatter:
+        return list(bad)
+    rows = np.array([one.row for one in bad], dtype=np.intp)
+    which = np.zeros(fitted.accepted.size, dtype=bool)
+    which[rows] = True
+    spread = np.moveaxis(noise_covariance(fitted.linear, noise, which), -1, 0)
+    off = fitted.linear.whitened[:, which].T
+    squares = np.einsum("ni,ni->n", off, np.linalg.solve(spread, off[:, :, None])[:, :, 0])
+    beyond = set(np.flatnonzero(which)[squares > STRAY].tolist())
+    return [one for one in bad if one.row in beyond]
 
 
 def _mostly_out(fitted: Fit, out: IntArray) -> list[str]:
@@ -134,6 +154,12 @@ def _why(bad: Sequence[BadReading]) -> str:
             "look like this"
         )
     return "they are far from where they should be, each by itself"
+
+
+def _of_one_nest(fitted: Fit, out: IntArray) -> str:
+    """What strays have in common, where all are readings of one nest."""
+    names = {fitted.model.rows.nest_name[row] for row in out}
+    return f", all of nest {names.pop()}" if len(names) == 1 and out.size > FEW else ""
 
 
 def _geometry(fitted: Fit) -> Iterator[Remark]:

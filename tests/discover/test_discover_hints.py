@@ -106,6 +106,9 @@ def test_likeness_is_the_cosine_between_what_is_there_and_the_nearest_effect() -
     assert found["effects"] == ["backlash"]
     assert found["value"] == pytest.approx(0.8, abs=0.03)
     assert "like backlash (0.8), but not backlash" in likeness_words(found, "it depends on q3")
+    nearly = found | {"value": 0.99}
+    assert "98 %" in likeness_words(nearly, "it depends on q3", ["backlash"])
+    assert "but not" in likeness_words(nearly, "it depends on q3", ["contact"])
     asked.unexplained = SimpleNamespace(significant=False)
     assert likeness_of(asked) is None  # type: ignore[arg-type]
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from app.files.machines import load_machine
+from calib.discover.advice import advice
 from calib.discover.discovery import Refitter, discover_run, stage_of
 from calib.discover.follow_up import FollowUp
-from calib.discover.report import advice
 from calib.effects import effect_named
 from calib.effects.run_clock import run_starts
 from calib.poses.reach import sample_poses
