@@ -18,8 +18,8 @@ def drawn(taking: Taking, noise: Noise, count: int, rng: np.random.Generator) ->
         out += np.sqrt(noise.share) * _tied(taking, noise, count, rng)
     out *= noise.scale
     if noise.scatter:
-        root = np.moveaxis(taking.scatter.root(noise.scatter, taking.live), 0, -1)
-        out = np.einsum("ijn,kjn->kin", root, out)
+        root, _ = taking.scatter.roots(noise.scatter, taking.live)
+        out = np.einsum("nij,kjn->kin", root, out)
     if noise.visit > 0.0:
         number = np.unique(taking.visit, return_inverse=True)[1]
         size = (count, taking.motions.shape[0], int(number.max()) + 1)
