@@ -32,9 +32,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from app.auto.autopilot import Autopilot, Seen
+from app.auto.decision import Limits
 from app.auto.findings import Findings, fresh_poses, look
 from app.auto.known import HOPELESS
-from app.auto.policy import Limits
 from app.files.machines import load_machine
 from app.files.pose_table import Pose
 from app.jobs.posing import choose_poses
@@ -115,6 +115,11 @@ class SimulatedLaboratory:
         self, poses: Mapping[str, Pose], title: str, began: Callable[[str], None], again: str | None
     ) -> tuple[str, float]:
         return self.run(poses), MINUTES_A_POSE * len(poses)
+
+    async def warm_up(
+        self, minutes: float, began: Callable[[str], None], again: str | None
+    ) -> float:
+        return minutes  # after its first run the machine is warm
 
     async def apply(self, model: Path) -> Mapping[str, str]:
         self.model = model

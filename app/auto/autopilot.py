@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from app.auto.aside import aside
+from app.auto.decision import Decision, Known, Limits
 from app.auto.findings import Findings, look
 from app.auto.journal import Decisions
-from app.auto.known import HOPELESS, REFUSED, VETOED, known_by, runs_of
-from app.auto.policy import SURE, Decision, Known, Limits, decide, others
-from app.auto.wording import COUNT, GO, SKIP, STOP, counted, decision_of, in_words
+from app.auto.known import HOPELESS, REFUSED, VETOED, WAITED, known_by, runs_of
+from app.auto.policy import SURE, decide, others
+from app.auto.wording import GO, SKIP, STOP, counted, decision_of, in_words, typed_of
 from app.errors import GateRefused, StoppedByOperator
 from app.files.pose_table import Pose
 from app.jobs.following_up import FollowUpReport, design
@@ -40,6 +41,11 @@ class Laboratory(Protocol):
         self, poses: Mapping[str, Pose], title: str, began: Callable[[str], None], again: str | None
     ) -> tuple[str, float]:
         """Measure poses, or go on with session ``again``: the run's folder, minutes it took."""
+
+    async def warm_up(
+        self, minutes: float, began: Callable[[str], None], again: str | None
+    ) -> float:
+        """Keep the machine moving, or go on with session ``again``: the minutes it took."""
 
     async def apply(self, model: Path) -> Mapping[str, str]:
         """Write a model through the gates; what was left out, and why."""
@@ -159,7 +165,7 @@ class Autopilot:
         if self.ask is None or hopeless or self.journal.session_of(number) is not None:
             return number, decision
         choices = {f"{one.words()} instead": one for one in others(known, self.limits, decision)}
-        typed = COUNT if decision.kind == "measure" else ""
+        typed = typed_of(decision)
         given = await self.ask(in_words(decision), (GO, SKIP, *choices, STOP), typed)
         if given == GO:
             return number, decision
@@ -186,6 +192,8 @@ class Autopilot:
                 return await self._measured(number, poses, decision.why)
             case "tell-apart":
                 return await self._told_apart(number, decision)
+            case "warm-up":
+                return await self._warmed_up(number, decision)
             case "apply":
                 return await self._applied()
             case _:
@@ -250,6 +258,13 @@ class Autopilot:
     def _left(self, decision: Decision, why: str) -> dict[str, Any]:
         assert decision.pair is not None
         return {"pair": list(decision.pair), HOPELESS: why, "says": f"left in question: {why}"}
+
+    async def _warmed_up(self, number: int, decision: Decision) -> dict[str, Any]:
+        minutes = await self.laboratory.warm_up(
+            decision.minutes, self._began(number), self.journal.session_of(number)
+        )
+        says = f"kept moving for {minutes:.0f} min"
+        return {"minutes": minutes, WAITED: True, "says": says}
 
     async def _applied(self) -> dict[str, Any]:
         model = self._found().model

@@ -7,10 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from app.auto.creeping import creep_of
+from app.auto.decision import Creep
 from app.auto.wording import found_words
 from app.files.pose_table import Pose
+from app.files.runs import read_run
 from app.jobs.corrector import Corrector
 from app.jobs.discovering import DiscoveryReport, discover
+from calib.arrays import Array
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import Poses
@@ -40,6 +44,8 @@ class Findings:
         RMS of the position error at fresh poses, by the covariance of what was identified.
     conditions : mapping of str to float
         Channels as they were at the end of the last run.
+    creep : Creep, optional
+        What was left then of a warm-up, where one was found.
     """
 
     runs: tuple[str, ...]
@@ -49,6 +55,7 @@ class Findings:
     unexplained: bool
     predicted_um: float
     conditions: Mapping[str, float] = field(default_factory=dict)
+    creep: Creep | None = None
 
     @classmethod
     def from_json(cls, line: Mapping[str, Any]) -> "Findings":
@@ -57,6 +64,7 @@ class Findings:
             tuple(line["runs"]), line["model"], tuple(line["effects"]),
             tuple((a, b) for a, b in line["ambiguous"]), line["unexplained"],
             line["predicted_um"], line["conditions"],
+            Creep(**line["creep"]) if line.get("creep") else None,
         )  # fmt: skip
 
     def words(self) -> str:
@@ -92,7 +100,18 @@ def look(runs: tuple[str, ...], model: Path) -> Findings:
         report.unexplained.significant,
         predicted(corrector),
         {name: ends[1] for name, ends in _channels(corrector).items()},
+        creep_of(corrector, _last_s(runs[-1]), _fresh(corrector.machine)),
     )
+
+
+def _last_s(run: str) -> float:
+    """When a run ended, s since it began."""
+    return float(read_run(Path(run)).run.time_s.max())
+
+
+def _fresh(machine: Machine) -> Array:
+    """Fresh poses as columns (6, N)."""
+    return np.array(list(fresh_poses(machine).values())).T
 
 
 def _in_question(report: DiscoveryReport) -> tuple[tuple[str, str], ...]:
@@ -130,7 +149,7 @@ def predicted(corrector: Corrector) -> float:
         If no fresh pose can be commanded with the model.
     """
     machine = corrector.machine
-    wanted = np.array(list(fresh_poses(machine).values())).T
+    wanted = _fresh(machine)
     task = wanted if machine.task.coordinates == FULL else task_values(
         machine.task, Poses.from_xyz_rpy(wanted)
     )  # fmt: skip

@@ -8,8 +8,8 @@ from datetime import datetime
 from pathlib import Path
 
 from app.auto.autopilot import Ask, Autopilot, Tell
+from app.auto.decision import Limits
 from app.auto.journal import NAME
-from app.auto.policy import Limits
 from app.auto.report import report_of
 from app.auto.station import StationLaboratory
 from app.defaults import FEWEST_FIRST, MOST_FIRST

@@ -4,14 +4,15 @@ import math
 from dataclasses import replace
 from typing import Any
 
+from app.auto.decision import Known
 from app.auto.findings import Findings
 from app.auto.journal import Decisions
-from app.auto.policy import Known
 
 SLOWEST, FASTEST = 0.5, 2.0
 """Powers of the number of poses by which a prediction is taken to fall."""
-HOPELESS, REFUSED, VETOED = "hopeless", "refused", "vetoed"
-"""Keys of what came of a decision: a pair that stays in question, a gate's no, a person's no."""
+HOPELESS, REFUSED, VETOED, WAITED = "hopeless", "refused", "vetoed", "waited"
+"""Keys of what came of a decision: a pair that stays in question, a gate's no, a person's no,
+time in which nothing was measured."""
 
 
 def runs_of(journal: Decisions) -> tuple[str, ...]:
@@ -24,7 +25,8 @@ def known_by(journal: Decisions) -> Known:
     done = journal.of("done")
     known = Known(
         poses=sum(int(line.get("poses", 0)) for line in done),
-        minutes=sum(float(line.get("minutes", 0.0)) for line in done),
+        minutes=_minutes(done),
+        waited=_minutes([line for line in done if WAITED in line]),
         hopeless={tuple(line["pair"]): line[HOPELESS] for line in done if HOPELESS in line},
         declined=_declined(done),
         ended=_ended(done),
@@ -47,9 +49,21 @@ def _with_findings(known: Known, journal: Decisions, done: list[dict[str, Any]])
         rounds_unknown=max(0, len(unknown) - 1) if found.unexplained else 0,
         verified_um=seen[-1]["verified_um"] if seen else None,
         at_most_um=seen[-1]["at_most_um"] if seen else None,
+        creep=None if found.creep is None else found.creep.after(_minutes(_since(journal))),
+        warmed=any(WAITED in line for line in _since(journal)),
         applied=bool(written) and done[written[-1]]["model"] == found.model,
         corrections=len(written),
     )
+
+
+def _minutes(done: list[dict[str, Any]]) -> float:
+    return sum(float(line.get("minutes", 0.0)) for line in done)
+
+
+def _since(journal: Decisions) -> list[dict[str, Any]]:
+    """What was done since the runs were asked the last time."""
+    last = max(k for k, line in enumerate(journal.lines) if line["event"] == "found")
+    return [line for line in journal.lines[last:] if line["event"] == "done"]
 
 
 def _falls(journal: Decisions, done: list[dict[str, Any]]) -> float:

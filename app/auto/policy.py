@@ -6,13 +6,8 @@ wanted (measure more), and nothing counts that fresh poses have not shown (verif
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Literal
 
-Kind = Literal["measure", "tell-apart", "apply", "verify", "stop"]
-Ground = Literal["first", "pair", "unknown", "accuracy", "write", "prove", "disagree", ""]
-"""Which question a decision answers; what was declined is not asked again of the same readings."""
+from app.auto.decision import Decision, Ground, Known, Limits
 
 SURE = 0.8
 """A follow-up is worth its time if it gives the right answer with this probability."""
@@ -26,114 +21,22 @@ APART = 10
 """Poses that tell a pair apart."""
 ROUNDS_UNKNOWN = 2
 """Sets of poses that are measured after something was found that no known effect explains."""
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What is wanted, and what may be spent.
-
-    Attributes
-    ----------
-    target_um : float
-        RMS of the position error at fresh poses.
-    minutes : float
-        Machine minutes for everything; infinite if nobody set a limit.
-    first : int
-        Poses of the first set.
-    apply : bool
-        Whether a correction may be written to the machine.
-    """
-
-    target_um: float
-    minutes: float = math.inf
-    first: int = 15
-    apply: bool = True
-
-
-@dataclass(frozen=True)
-class Known:
-    """What is known by now.
-
-    Attributes
-    ----------
-    poses, minutes : int, float
-        Measured for the fit, and spent in all.
-    predicted_um : float
-        RMS of the position error at fresh poses by the covariance of what was identified.
-    falls : float
-        How that falls with the poses, as poses ** -falls: a half, unless the last set with the
-        same effects has shown that it falls faster.
-    ambiguous : tuple of (str, str)
-        Effects that the readings cannot tell apart: one that the model has, and its rival.
-    hopeless : mapping of (str, str) to str
-        Pairs that no affordable measurement tells apart, and why.
-    unexplained : bool
-        Whether something is missing that no known effect explains.
-    rounds_unknown : int
-        Sets measured since then.
-    verified_um : float, optional
-        RMS at fresh poses without the part of the tracker, since the last correction.
-    at_most_um : float, optional
-        Its upper limit at 95 %: what the tracker's noise leaves open.
-    applied : bool
-        Whether the present model is on the machine.
-    corrections : int
-        How often one was written.
-    declined : tuple of str
-        Grounds of decisions to which the operator said no, since the last readings.
-    """
-
-    poses: int = 0
-    minutes: float = 0.0
-    predicted_um: float = math.inf
-    falls: float = 0.5
-    ambiguous: tuple[tuple[str, str], ...] = ()
-    hopeless: Mapping[tuple[str, str], str] = field(default_factory=dict)
-    unexplained: bool = False
-    rounds_unknown: int = 0
-    verified_um: float | None = None
-    at_most_um: float | None = None
-    applied: bool = False
-    corrections: int = 0
-    declined: tuple[str, ...] = ()
-    ended: str = ""
-
-
-@dataclass(frozen=True)
-class Decision:
-    """What is done next, and why.
-
-    ``count`` poses; ``pair`` of effects where they are told apart; ``expected`` names what it
-    should bring, in numbers; ``reached`` is of a stop: whether the target holds; ``ground`` is
-    empty where the operator chose.
-    """
-
-    kind: Kind
-    why: str
-    count: int = 0
-    pair: tuple[str, str] | None = None
-    expected: Mapping[str, float] = field(default_factory=dict)
-    reached: bool | None = None
-    ground: Ground = ""
-
-    def words(self) -> str:
-        """What is done, in a few words."""
-        match self.kind:
-            case "measure":
-                return f"measure {self.count} poses"
-            case "tell-apart":
-                assert self.pair is not None
-                return f"tell {self.pair[0]} from {self.pair[1]}"
-            case "apply":
-                return "write the correction"
-            case "verify":
-                return "verify at fresh poses"
-            case "stop":
-                return "stop"
+PROOF = 24
+"""Poses of a verification, for which time is kept."""
+STEADY = 0.25
+"""Part of the target that a machine may still creep: 3 % more where squares add."""
+LONGEST_MIN = 120.0
+"""More than this is not waited for at once, and what is slower is no warm-up."""
 
 
 def decide(known: Known, limits: Limits) -> Decision:
-    """Say what is done next."""
+    """Say what is done next; what needs a warm machine is put off until it is."""
+    due = _due(known, limits)
+    return _warm_first(known, limits, due) or due
+
+
+def _due(known: Known, limits: Limits) -> Decision:
+    """What is to be done of a machine as it is."""
     if known.ended:
         return _stop(known.ended, reached=False)
     if known.poses == 0:
@@ -162,10 +65,58 @@ def _affordable(known: Known, limits: Limits) -> int:
 
 def _in_time(known: Known, limits: Limits) -> float:
     """Poses for which there is time in all, by what the ones before have taken; may be infinite."""
-    left, each = limits.minutes - known.minutes, known.minutes / known.poses
+    left, each = limits.minutes - known.minutes, _each(known)
     if math.isinf(limits.minutes) or each <= 0.0:
         return math.inf
     return float(max(0.0, left // each))
+
+
+def _each(known: Known) -> float:
+    """Minutes that a pose has taken."""
+    return (known.minutes - known.waited) / known.poses
+
+
+def _warm_first(known: Known, limits: Limits, due: Decision) -> Decision | None:
+    """Let it warm up before what is due, where it creeps by more than the target leaves room for.
+
+    Not before it is known that it is this and nothing else, nor where less than half of it would
+    be gone in the time that is left.
+    """
+    creep = known.creep
+    if creep is None or due.kind == "stop" or "warm" in known.declined:
+        return None
+    if due.pair is not None and creep.effect in due.pair:
+        return None
+    wanted = warm_up_min(known, limits)
+    if wanted <= 0.0:
+        return None
+    kept = PROOF * _each(known) if limits.apply else FEWEST * _each(known)
+    minutes = math.floor(min(wanted, limits.minutes - known.minutes - kept))
+    if minutes < min(wanted, creep.tau_min * math.log(2.0)):
+        return None
+    return _warming(known, minutes, f"it creeps while it warms up ({creep.effect})", "warm")
+
+
+def warm_up_min(known: Known, limits: Limits) -> float:
+    """Whole minutes after which what it creeps is small beside the target; 0 if it is, or never."""
+    creep = known.creep
+    if creep is None or creep.tau_min > LONGEST_MIN:
+        return 0.0
+    short = creep.left_um / (STEADY * limits.target_um)
+    return min(math.ceil(creep.tau_min * math.log(short)), LONGEST_MIN) if short > 1.0 else 0.0
+
+
+def _warming(known: Known, minutes: float, why: str, ground: Ground) -> Decision:
+    creep = known.creep
+    assert creep is not None
+    then = creep.after(minutes)
+    return Decision(
+        "warm-up",
+        f"{why}, with a time constant of {creep.tau_min:.0f} min",
+        minutes=minutes,
+        expected={"creeps_um": creep.left_um, "creeps_um_then": then.left_um},
+        ground=ground,
+    )
 
 
 def _apart(known: Known, affordable: int) -> Decision | None:
@@ -213,18 +164,19 @@ def _more(known: Known, limits: Limits, affordable: int) -> Decision:
         )
     in_time = _in_time(known, limits)
     then = _then(known, in_time)
-    if wanted > in_time and then > limits.target_um:
+    if wanted > in_time and then > limits.target_um and not known.warmed:
         return _stop(
             f"{known.predicted_um:.1f} um are predicted; the {in_time:.0f} poses for which there "
             f"is time would bring {then:.1f} um, {limits.target_um:g} um are wanted",
             reached=False,
         )
-    count = min(max(FEWEST, wanted), MOST, affordable)
+    most = max(FEWEST, known.poses) if known.warmed else MOST
+    count = min(max(FEWEST, wanted), most, MOST, affordable)
     return Decision(
         "measure",
         f"{known.predicted_um:.1f} um are predicted, {limits.target_um:g} um are wanted",
         count,
-        expected={"predicted_um": _then(known, count)},
+        expected={"at_most_um" if known.warmed else "predicted_um": _then(known, count)},
         ground="accuracy",
     )
 
@@ -286,6 +238,10 @@ def others(known: Known, limits: Limits, proposed: Decision) -> tuple[Decision, 
             for pair in dict.fromkeys(known.ambiguous)
             if pair != proposed.pair
         ]
+    if proposed.kind != "warm-up" and 0.0 < (wait := warm_up_min(known, limits)) <= (
+        limits.minutes - known.minutes
+    ):
+        found.append(_warming(known, wait, why, ""))
     good = math.isfinite(known.predicted_um)
     if limits.apply and good and not known.applied and proposed.kind != "apply":
         expected = {"predicted_um": known.predicted_um}

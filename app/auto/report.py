@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from app.auto.autopilot import Autopilot
+from app.auto.decision import Decision
 from app.auto.known import HOPELESS
-from app.auto.policy import Decision
 from app.jobs.automatic import AutoReport
 
 
@@ -26,6 +26,7 @@ def report_of(pilot: Autopilot, last: Decision, folder: Path) -> AutoReport:
             {
                 **{key: line[key] for key in ("number", "kind", "why", "count", "expected")},
                 "pair": line["pair"] or (),
+                "minutes": line.get("minutes", 0.0),
                 "came": done.get(line["number"], {}).get("says", ""),
             }
             for line in journal.of("decided")

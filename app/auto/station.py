@@ -16,8 +16,11 @@ from app.files.runs import read_run
 from app.jobs.measuring import begin_measuring
 from app.jobs.posing import choose_poses
 from app.jobs.verifying import begin_verifying
+from app.session.journal import Journal
+from app.session.plans import warming_plan
 from app.session.session import Outcome, Session
 from app.session.station import Station
+from app.session.within import JOURNAL
 from app.verification import Verification, judge_session
 from app.writeback.gates import Gates
 from app.writeback.procedure import WriteBack
@@ -25,6 +28,8 @@ from calib.errors import BadInput
 
 SURE_SIGMAS = 1.645
 """One-sided, 95 %."""
+ROUND = 4
+"""Of the fresh poses each so-manieth is on the round that a machine goes while it warms up."""
 
 
 class StationLaboratory:
@@ -101,6 +106,27 @@ class StationLaboratory:
         outcome = await self._run(session)
         judged = await aside(partial(judge_session, outcome.folder))
         return Seen(*own_part_um(judged), _minutes(outcome))
+
+    async def warm_up(
+        self, minutes: float, began: Callable[[str], None], again: str | None
+    ) -> float:
+        """Keep the machine moving between fresh poses in a session of its own; its minutes."""
+        session = self._again(again)
+        if session is None:
+            site = self._station.site
+            fresh = await aside(partial(fresh_poses, site.machine))
+            poses = dict(list(fresh.items())[::ROUND])
+            session = Session.create(
+                site, warming_plan(site, poses, minutes), self._folder, station=self._station,
+                unattended=self._unattended,
+            )  # fmt: skip
+            began(str(session.folder))
+        outcome = await self._run(session)
+        journal = Journal(outcome.folder / JOURNAL, read_only=True)
+        try:
+            return journal.last_time() / 60.0
+        finally:
+            journal.close()
 
     async def apply(self, model: Path) -> Mapping[str, str]:
         """Write a model through the gates and keep it; what was left out, and why."""

@@ -9,12 +9,16 @@ from app.jobs.record import Record, Report
 
 @dataclass(frozen=True, kw_only=True)
 class DecisionEntry(Record):
-    """One decision: what, why, what was expected of it, and what came of it in words."""
+    """One decision: what, why, what was expected of it, and what came of it in words.
+
+    ``count`` poses, or ``minutes`` of letting it warm up.
+    """
 
     number: int
     kind: str
     why: str
     count: int
+    minutes: float
     pair: tuple[str, ...]
     expected: Mapping[str, float]
     came: str

@@ -8,7 +8,7 @@ from typing import Literal
 
 from calib.errors import BadInput
 
-Goal = Literal["nowhere", "home", "pose"]
+Goal = Literal["nowhere", "home", "pose", "round"]
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,8 @@ class StepKind:
     name: str
     words: str
     moves_to: Goal = "nowhere"
-    """Where the machine stands when it is done; ``pose`` is the one among the step's arguments."""
+    """Where the machine stands when it is done: ``pose`` is the one among the step's arguments,
+    ``round`` the last of those."""
     rests_on_readings: bool = False
     """Whether it is to be done again when the readings so far are set aside."""
     every_time: bool = False
@@ -44,6 +45,7 @@ TRACKER = StepKind(
 )
 DRIVES = StepKind("drives", "drives on", every_time=True, skippable=False)
 WARM_UP = StepKind("warm-up", "wait until laser and machine are warm and steady")
+EXERCISE = StepKind("exercise", "keep the machine moving, {minutes:g} min", moves_to="round")
 HOME = StepKind("home", "go to the home pose", moves_to="home", often=True)
 MOVE = StepKind("move", "move to pose {pose}", moves_to="pose", often=True)
 CARRY = StepKind("carry", "SMR {smr} into nest {nest}")
@@ -69,8 +71,9 @@ REST = StepKind("rest", "take the power off the drives", skippable=False)
 KINDS: dict[str, StepKind] = {
     kind.name: kind
     for kind in (
-        CONNECT, CHECK_PATH, TRACKER, DRIVES, WARM_UP, HOME, MOVE, CARRY, CONFIRM, DIRECTIONS, READ,
-        REFERENCE, DRIFT, TWO_FACE, TRUTH, GAUGE, APART, TOUCH, PROBE, FOLLOWS, MARK, BETWEEN, REST,
+        CONNECT, CHECK_PATH, TRACKER, DRIVES, WARM_UP, EXERCISE, HOME, MOVE, CARRY, CONFIRM,
+        DIRECTIONS, READ, REFERENCE, DRIFT, TWO_FACE, TRUTH, GAUGE, APART, TOUCH, PROBE, FOLLOWS,
+        MARK, BETWEEN, REST,
     )
 }  # fmt: skip
 """Every kind by its word."""

@@ -23,8 +23,9 @@ def waypoints(plan: Plan) -> list[str]:
     """Labels of the poses in the order in which the plan goes to them, home first."""
     path = [HOME]
     for step in plan.steps:
-        if step.goal is not None and step.goal != path[-1]:
-            path.append(step.goal)
+        for label in step.way:
+            if label != path[-1]:
+                path.append(label)
     return path
 
 

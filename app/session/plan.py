@@ -31,16 +31,28 @@ class Step:
     @property
     def goal(self) -> str | None:
         """Label of the pose where the machine stands after it; None where it moves nothing."""
-        if self.kind.moves_to == "pose":
-            return str(self.args["pose"])
-        return HOME if self.kind.moves_to == "home" else None
+        return self.way[-1] if self.way else None
+
+    @property
+    def way(self) -> tuple[str, ...]:
+        """Labels of all poses to which it goes, in order; a round may be gone several times."""
+        match self.kind.moves_to:
+            case "pose":
+                return (str(self.args["pose"]),)
+            case "home":
+                return (HOME,)
+            case "round":
+                labels = tuple(map(str, self.args["poses"]))
+                return (*labels, *labels)
+            case "nowhere":
+                return ()
 
 
 @dataclass(frozen=True)
 class Plan:
     """Numbered steps over labelled poses (x, y, z mm; rx, ry, rz rad; platform in base frame).
 
-    ``purpose`` is ``measure`` or ``verify``.
+    ``purpose`` is ``measure``, ``verify``, ``check`` (of a write-back) or ``warming``.
     """
 
     purpose: str

@@ -1,5 +1,6 @@
-"""The plans that operators run: measure poses, in either order, and verify."""
+"""The plans that operators run: measure poses, in either order, verify, and warm a machine up."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -13,6 +14,8 @@ from app.session.plan import Plan, PlanWriter
 from calib.errors import BadInput
 
 Order = Literal["nest-by-nest", "pose-by-pose"]
+EXERCISE_MIN = 5.0
+"""Of a machine that warms up, one step."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +90,35 @@ def measure_plan(
     plan.add(kinds.REST)
     title = options.title or f"{site.machine.name}, {len(poses)} poses, {len(nests)} nests"
     return Plan(purpose, title, site.machine_name, dict(poses), tuple(plan.steps))
+
+
+def warming_plan(site: Site, poses: Mapping[str, Pose], minutes: float) -> Plan:
+    """Keep the machine moving between poses, so that it gets as warm as it is when it is used.
+
+    In steps of five minutes: a session that is gone on with does what is left.
+
+    Raises
+    ------
+    BadInput
+        Without poses, and for no time.
+    """
+    if not poses or not minutes > 0.0:
+        raise BadInput(
+            f"{len(poses)} poses in {minutes:g} min warm nothing up",
+            remedy="Give poses, and a time of more than 0 min",
+        )
+    plan = PlanWriter()
+    for kind in (kinds.CONNECT, kinds.CHECK_PATH, kinds.DRIVES):
+        plan.add(kind)
+    parts = math.ceil(minutes / EXERCISE_MIN)
+    for part in range(1, parts + 1):
+        begins, ends = EXERCISE_MIN * (part - 1), min(EXERCISE_MIN * part, minutes)
+        says = f"keep the machine moving, minutes {begins:g} to {ends:g}"
+        plan.add(kinds.EXERCISE, str(part), says, minutes=ends - begins, poses=list(poses))
+    plan.add(kinds.HOME, "end", "return to the home pose")
+    plan.add(kinds.REST)
+    title = f"{site.machine.name}, {minutes:g} min of warming up"
+    return Plan("warming", title, site.machine_name, dict(poses), tuple(plan.steps))
 
 
 def _prepare(plan: PlanWriter, options: PlanOptions) -> None:

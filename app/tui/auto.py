@@ -11,7 +11,7 @@ from textual.containers import Horizontal, VerticalScroll
 from textual.content import Content
 from textual.widgets import Static
 
-from app.auto.policy import Decision
+from app.auto.decision import Decision
 from app.auto.wording import decision_of, found_words, gained
 from app.tui.automatic import Automatic, FlightWish, begun_under
 from app.tui.dialogs import Pick

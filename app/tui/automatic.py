@@ -7,9 +7,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.auto.decision import Limits
 from app.auto.journal import NAME, Decisions
-from app.auto.policy import Limits
-from app.auto.wording import number_of_poses
+from app.auto.wording import understood
 from app.errors import GateRefused, StoppedByOperator
 from app.session import events as ev
 from app.session.session import Session
@@ -120,7 +120,7 @@ class Automatic:
             finally:
                 self._answer = None
                 tell(ev.PromptAnswered(DECIDE, given))
-            if given in answers or (typed and number_of_poses(given)):
+            if given in answers or understood(typed, given):
                 return given
             self._desk.picture.say_trouble(f"{given!r} is no answer", typed, "warn")
 

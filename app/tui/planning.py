@@ -163,7 +163,7 @@ class NewFlight(Dialog[FlightWish]):
         """Target, time, first set, writing, start."""
         for name, value, says in (
             ("target", "8", "RMS position error at fresh poses that is wanted, µm:"),
-            ("hours", "", "Hours of machine time for all readings (empty: no limit):"),
+            ("hours", "", "Hours of machine time in all (empty: no limit):"),
             ("first", "15", f"Poses to begin with, {FEWEST_FIRST} to {MOST_FIRST}:"),
         ):
             yield Static(Content(says), classes="form-label")

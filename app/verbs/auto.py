@@ -24,7 +24,7 @@ from app.jobs.automatic import AutoReport
     help="RMS position error at fresh poses that is wanted.",
 )
 @click.option(
-    "--hours", type=click.FloatRange(min=0.0, min_open=True), help="Machine time for all readings."
+    "--hours", type=click.FloatRange(min=0.0, min_open=True), help="Machine time for all of it."
 )
 @click.option(
     "--first",
@@ -96,7 +96,7 @@ async def fly(
 
 async def ask(text: str, answers: tuple[str, ...], typed: str) -> str:
     """Ask the person at the terminal; answers are numbered, the first is proposed."""
-    from app.auto.wording import number_of_poses
+    from app.auto.wording import understood
     from app.console import in_daemon_thread
 
     def asked() -> str:
@@ -105,7 +105,7 @@ async def ask(text: str, answers: tuple[str, ...], typed: str) -> str:
         while True:
             which = f"Which ({typed})" if typed else "Which"
             given: str = click.prompt(f"{text}. {which}", default="1", err=True)
-            if given in answers or (typed and number_of_poses(given)):
+            if given in answers or understood(typed, given):
                 return given
             if given.isdigit() and 1 <= int(given) <= len(answers):
                 return answers[int(given) - 1]

@@ -3,14 +3,16 @@
 import asyncio
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from math import exp
 from pathlib import Path
 
 import pytest
 
 from app.auto.autopilot import Autopilot, Seen
+from app.auto.decision import Decision, Limits
 from app.auto.journal import NAME, Decisions
 from app.auto.known import known_by
-from app.auto.policy import Decision, Limits
 from app.auto.report import report_of
 from app.errors import GateRefused, StoppedByOperator
 from app.files.pose_table import Pose, poses_text
@@ -26,8 +28,9 @@ HIDDEN = {"backlash.leg3": 0.03}
 class Simulated:
     """Runs of the mock's physics; what is written is only remembered."""
 
-    def __init__(self, folder: Path, *, lost_at: int = -1) -> None:
-        self.folder, self.lost_at = folder, lost_at
+    def __init__(self, folder: Path, *, lost_at: int = -1, lost_warm: int = -1) -> None:
+        self.folder, self.lost_at, self.lost_warm = folder, lost_at, lost_warm
+        self.warmed: list[tuple[float, str | None]] = []
         self.asked: list[tuple[str, str | None]] = []
         self.written: list[Path] = []
 
@@ -48,6 +51,16 @@ class Simulated:
         simulate("hexapod", run, seed=3, poses=table, effects=HIDDEN)
         return run, 2.0 * len(poses)
 
+    async def warm_up(
+        self, minutes: float, began: Callable[[str], None], again: str | None
+    ) -> float:
+        self.warmed.append((minutes, again))
+        if again is None:
+            began(str(self.folder / "warming"))
+        if len(self.warmed) - 1 == self.lost_warm:
+            raise DeviceError("controller: no answer")
+        return minutes
+
     async def apply(self, model: Path) -> Mapping[str, str]:
         self.written.append(model)
         return {}
@@ -65,7 +78,7 @@ class Operator:
     async def __call__(self, text: str, answers: tuple[str, ...], typed: str) -> str:
         assert answers[:2] == ("go on", "skip")
         assert answers[-1] == "stop"
-        assert bool(typed) == text.startswith("measure")
+        assert bool(typed) == text.startswith(("measure", "let it warm up"))
         self.asked.append(text)
         return self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
 
@@ -73,6 +86,22 @@ class Operator:
 def fly(folder: Path, laboratory: Simulated, **more: object) -> tuple[Autopilot, Decision]:
     pilot = Autopilot(folder, laboratory, Limits(8.0, first=12), **more)  # type: ignore[arg-type]
     return pilot, asyncio.run(pilot.run())
+
+
+CREEP = {"effect": "leg-warm-up", "left_um": 40.0, "tau_min": 15.0}
+
+
+def measured(folder: Path, creep: Mapping[str, object] | None = None) -> None:
+    """A journal in which a first set was measured, and found good enough."""
+    journal = Decisions(folder)
+    journal.write("begun", seed=1, limits={"target_um": 8.0, "first": 12, "apply": True})
+    first = Decision("measure", "nothing was measured yet", 12, ground="first")
+    journal.write("decided", number=1, **asdict(first))
+    journal.write("done", number=1, run="one", poses=12, minutes=24.0)
+    journal.write(
+        "found", runs=["one"], model="model-01.toml", effects=["leg-warm-up"], ambiguous=[],
+        unexplained=False, predicted_um=3.0, conditions={}, creep=creep,
+    )  # fmt: skip
 
 
 def test_the_whole_way_and_its_journal(tmp_path: Path) -> None:
@@ -92,7 +121,6 @@ def test_the_whole_way_and_its_journal(tmp_path: Path) -> None:
     assert len(again.journal.lines) == len(pilot.journal.lines) + 2
 
 
-@pytest.mark.long
 class Good(Simulated):
     """Its machine was calibrated before."""
 
@@ -101,8 +129,8 @@ class Good(Simulated):
 
 
 def test_a_machine_that_is_good_already_is_left_so_and_proven(tmp_path: Path) -> None:
-    laboratory = Good(tmp_path)
-    pilot, last = fly(tmp_path, laboratory)
+    measured(tmp_path)
+    pilot, last = fly(tmp_path, Good(tmp_path))
     kinds = [line["kind"] for line in pilot.journal.of("decided")]
     assert kinds[-3:] == ["apply", "verify", "stop"]
     assert last.reached
@@ -189,3 +217,56 @@ def test_a_damaged_journal_is_named(tmp_path: Path) -> None:
     (tmp_path / NAME).write_text('{"event": "begun"}\nnot json\n{"event": "done"}\n')
     with pytest.raises(BadInput, match=r"decisions\.jsonl:2"):
         Decisions(tmp_path)
+
+
+def kinds_of(folder: Path) -> list[str]:
+    return [line["kind"] for line in Decisions(folder).of("decided")]
+
+
+def test_a_machine_that_creeps_is_let_warm_up_before_it_is_written_and_proven(
+    tmp_path: Path,
+) -> None:
+    measured(tmp_path, CREEP)
+    with pytest.raises(DeviceError):
+        fly(tmp_path, Simulated(tmp_path, lost_warm=0))
+    laboratory = Simulated(tmp_path)
+    pilot, last = fly(tmp_path, laboratory)
+    assert laboratory.warmed == [
+        (45.0, str(tmp_path / "warming"))
+    ]  # the same session, gone on with
+    assert kinds_of(tmp_path) == ["measure", "warm-up", "apply", "verify", "stop"]
+    report = report_of(pilot, last, tmp_path)
+    assert faults_of(report.to_json()) == []
+    assert (report.reached, report.minutes, report.poses) == (True, 24.0 + 45.0 + 40.0, 12)
+    wait = report.decisions[1]
+    assert wait.minutes == 45.0
+    assert wait.expected == pytest.approx({"creeps_um": 40.0, "creeps_um_then": 40.0 * exp(-3.0)})
+    assert wait.came == "kept moving for 45 min"
+
+
+def test_a_person_says_how_long_it_warms_up_or_that_it_does_not(tmp_path: Path) -> None:
+    for said, warmed, kinds in (
+        (("20 min", "skip", "go on"), [(20.0, None)], ["warm-up", "warm-up", "warm-up"]),
+        (("skip", "go on"), [], ["warm-up"]),
+    ):
+        folder = tmp_path / said[0]
+        folder.mkdir()
+        measured(folder, CREEP)
+        laboratory, operator = Simulated(folder), Operator(*said)
+        _, last = fly(folder, laboratory, ask=operator)
+        assert laboratory.warmed == warmed
+        assert kinds_of(folder) == ["measure", *kinds, "apply", "verify", "stop"]
+        assert last.reached
+        assert "the platform is about 40 um from where it will be, 2.0 um then" in operator.asked[0]
+
+
+def test_journals_of_before_machines_were_let_warm_up_are_gone_on_with(tmp_path: Path) -> None:
+    measured(tmp_path, CREEP)
+    path = tmp_path / NAME
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    for line in lines:
+        line.pop("minutes", None) if line["event"] == "decided" else line.pop("creep", None)
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    _, last = fly(tmp_path, Simulated(tmp_path))
+    assert last.reached
+    assert kinds_of(tmp_path) == ["measure", "apply", "verify", "stop"]

@@ -6,12 +6,12 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.auto import Decision, Known, Limits, decide
-from app.auto.policy import FEWEST, MOST, others
+from app.auto import Creep, Decision, Known, Limits, decide
+from app.auto.policy import FEWEST, LONGEST_MIN, MOST, PROOF, STEADY, others
 
 EFFECTS = st.sampled_from(["backlash", "screw-pitch", "thermal-growth", "frame-shift"])
 PAIRS = st.tuples(EFFECTS, EFFECTS)
-GROUNDS = st.sampled_from(["first", "unknown", "accuracy", "write", "prove", "disagree"])
+GROUNDS = st.sampled_from(["first", "unknown", "warm", "accuracy", "write", "prove", "disagree"])
 UM = st.floats(0.1, 500.0)
 knowns = st.builds(
     Known,
@@ -27,6 +27,9 @@ knowns = st.builds(
     applied=st.booleans(),
     corrections=st.integers(0, 3),
     declined=st.lists(GROUNDS, max_size=3).map(tuple),
+    warmed=st.booleans(),
+    creep=st.none()
+    | st.builds(Creep, st.just("leg-warm-up"), st.floats(0.0, 1000.0), st.floats(2.0, 300.0)),
 )
 limits = st.builds(
     Limits,
@@ -130,6 +133,14 @@ def _after(known: Known, decision: Decision, draw: st.DataObject) -> Known:
             return replace(known, applied=True, verified_um=None, corrections=known.corrections + 1)
         case "verify":
             return replace(known, verified_um=draw.draw(UM), minutes=known.minutes + 24.0)
+        case "warm-up":
+            assert known.creep is not None
+            return replace(
+                known,
+                minutes=known.minutes + decision.minutes,
+                waited=known.waited + decision.minutes,
+                creep=known.creep.after(decision.minutes),
+            )
     raise AssertionError(decision)
 
 
@@ -170,3 +181,58 @@ def test_fresh_poses_that_disagree_are_looked_into_once() -> None:
     known = Known(poses=20, predicted_um=3.0, applied=True, corrections=1, verified_um=20.0)
     assert decide(known, Limits(8.0)).kind == "measure"
     assert decide(replace(known, corrections=2), Limits(8.0)).reached is False
+
+
+@given(knowns, limits)
+def test_it_is_let_warm_up_only_where_that_brings_something_that_can_be_afforded(
+    known: Known, wanted: Limits
+) -> None:
+    decision = decide(known, wanted)
+    cold = replace(known, creep=None)
+    if decision.kind != "warm-up":
+        assert decision == decide(cold, wanted)
+        return
+    creep, each = known.creep, known.minutes / known.poses
+    assert creep is not None
+    assert decide(cold, wanted).kind != "stop"
+    assert creep.left_um > STEADY * wanted.target_um
+    assert 0.0 < decision.minutes <= LONGEST_MIN
+    kept = (PROOF if wanted.apply else FEWEST) * each
+    assert decision.minutes <= wanted.minutes - known.minutes - kept
+    then = decision.expected["creeps_um_then"]
+    assert then <= 0.51 * creep.left_um or then <= 1.01 * STEADY * wanted.target_um
+    after = replace(
+        known, minutes=known.minutes + decision.minutes, waited=known.waited + decision.minutes,
+        creep=creep.after(decision.minutes),
+    )  # fmt: skip
+    if then <= STEADY * wanted.target_um:
+        assert decide(after, wanted).kind != "warm-up"
+
+
+def test_what_is_not_sure_to_be_a_warm_up_is_looked_into_before_it_is_waited_for() -> None:
+    pair, creep = ("leg-warm-up", "leg-warming"), Creep("leg-warm-up", 40.0, 15.0)
+    known = Known(poses=20, minutes=40.0, predicted_um=3.0, ambiguous=(pair,), creep=creep)
+    assert decide(known, Limits(8.0)).pair == pair
+    known = replace(known, hopeless={pair: "no poses"})
+    decision = decide(known, Limits(8.0))
+    assert (decision.words(), decision.ground) == ("let it warm up for 45 min", "warm")
+    assert decision.expected["creeps_um_then"] <= 2.0
+    known = replace(known, declined=("warm",))
+    assert decide(known, Limits(8.0)).kind == "apply"
+    said = [one.words() for one in others(known, Limits(8.0), decide(known, Limits(8.0)))]
+    assert "let it warm up for 45 min" in said
+
+
+def test_a_warm_machine_is_not_reckoned_by_what_the_cold_one_has_shown() -> None:
+    known = Known(poses=15, minutes=90.0, waited=60.0, predicted_um=50.0, warmed=True)
+    assert decide(known, Limits(8.0)).count == 15
+    assert decide(known, Limits(8.0)).expected.keys() == {"at_most_um"}
+    assert decide(known, Limits(8.0, minutes=130.0)).count == 15
+    assert decide(replace(known, warmed=False), Limits(8.0)).count == MOST
+    assert decide(replace(known, warmed=False), Limits(8.0, minutes=130.0)).kind == "stop"
+
+
+def test_time_that_was_waited_is_not_the_time_of_a_pose() -> None:
+    known = Known(poses=20, minutes=100.0, waited=60.0, predicted_um=10.0)
+    assert decide(known, Limits(8.0, minutes=140.0)).count == 19
+    assert decide(replace(known, waited=0.0), Limits(8.0, minutes=140.0)).kind == "stop"

@@ -22,7 +22,10 @@ from app.session.session import Session
 from calib.errors import BadInput
 from drivers.errors import DeviceError
 
-ARGUMENTS = {"pose": "a", "nest": "3", "smr": 1, "of": "a", "pose2": "a"}
+ARGUMENTS = {
+    "pose": "a", "nest": "3", "smr": 1, "of": "a", "pose2": "a", "minutes": 5.0,
+    "poses": ["b", "a"],
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -57,7 +60,7 @@ def test_words_and_goal_come_from_the_steps_own_arguments(kind: StepKind, plan: 
     step = next(step for step in plan.steps if step.kind is kind)
     assert step.says
     assert "{" not in step.says
-    assert step.goal == {"nowhere": None, "home": "home", "pose": "a"}[kind.moves_to]
+    assert step.goal == {"nowhere": None, "home": "home", "pose": "a", "round": "a"}[kind.moves_to]
 
 
 def test_steps_that_rest_on_readings_are_due_again_when_readings_are_set_aside(

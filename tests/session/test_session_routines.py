@@ -3,25 +3,30 @@
 import asyncio
 import time
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
-from session_lab import Lab, lab_in
-from session_mock import Heard
+from session_lab import Lab, lab_in, lab_site
+from session_mock import POSES, Heard
 
 from app.files.machines import load_machine
 from app.session import events as ev
 from app.session import kinds
 from app.session.journal import NewRow
+from app.session.path import waypoints
 from app.session.plan import Plan, PlanWriter, Step
+from app.session.plans import warming_plan
 from app.session.routines.beam import aim, measured
 from app.session.routines.carrying import ensure_smr, misplaced
 from app.session.routines.moving import commanded_coordinates, ensure_at, take_stock
 from app.session.routines.preparing import warm_up
 from app.session.routines.reading import in_band, read
 from app.session.routines.referencing import drift, reference
+from app.session.session import Session
 from app.session.station import Station
+from calib.errors import BadInput
 from calib.frames import Frame
 from drivers.errors import HeartbeatLost, LinkLost, NoTarget, NotReady
 
@@ -334,3 +339,28 @@ async def test_a_whole_plan_asks_for_each_smr_once_and_reads_every_nest(
     assert all(e.miss_mm < 1e-9 for e in heard.of(ev.ReadingTaken))
     assert not heard.of(ev.AlarmRaised)
     assert not lab.controller.enabled
+
+
+async def test_a_machine_is_kept_moving_on_ways_that_were_checked(
+    tmp_path: Path, heard: Heard
+) -> None:
+    """Whole rounds, for as long as was said; what was done is not done again."""
+    plan = warming_plan(lab_site(), {label: POSES[label] for label in "abc"}, 12.0)
+    assert [one.args["minutes"] for one in plan.steps if one.kind is kinds.EXERCISE] == [5, 5, 2]
+    lab = lab_in(tmp_path, plan=plan)
+    lab.session.observers.watch(heard)
+    outcome = await lab.session.run()
+    went = [event.pose_label for event in heard.of(ev.PoseCommanded)]
+    assert went[-1] == "home"
+    assert set(pairwise(went)) <= set(pairwise(waypoints(plan)))
+    assert outcome.readings == 0
+    assert not outcome.run_folder.exists()
+    assert lab.session.journal.last_time() >= 60.0 * 12.0
+    again = [one.kind for one in Session.reopen(outcome.folder).due()]
+    assert again == [kinds.CONNECT, kinds.CHECK_PATH, kinds.DRIVES]
+
+
+@pytest.mark.parametrize(("poses", "minutes"), [({}, 5.0), ({"a": POSES["a"]}, 0.0)])
+def test_nothing_is_warmed_up_in_no_time(poses: dict, minutes: float) -> None:
+    with pytest.raises(BadInput, match="warm nothing up"):
+        warming_plan(lab_site(), poses, minutes)

@@ -10,7 +10,7 @@ from app.session.routines.carrying import carry, confirm
 from app.session.routines.directions import directions
 from app.session.routines.following import follows
 from app.session.routines.gauging import apart, between_marks, gauge, mark, touch
-from app.session.routines.moving import home, move
+from app.session.routines.moving import exercise, home, move
 from app.session.routines.preparing import check_path, connect, drives, rest, tracker, warm_up
 from app.session.routines.probing import probe
 from app.session.routines.reading import read
@@ -26,6 +26,7 @@ ROUTINES: dict[StepKind, Routine] = {
     kinds.TRACKER: tracker,
     kinds.DRIVES: drives,
     kinds.WARM_UP: warm_up,
+    kinds.EXERCISE: exercise,
     kinds.HOME: home,
     kinds.MOVE: move,
     kinds.CARRY: carry,

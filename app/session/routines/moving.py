@@ -34,6 +34,22 @@ async def move(work: Work, step: Step) -> Done:
     return Done(f"at pose {step.args['pose']}", {"q": work.memory.q})
 
 
+async def exercise(work: Work, step: Step) -> Done:
+    """Go round poses until the time is over: whole rounds, as only their ways were checked.
+
+    A machine that a person moves is only given the time.
+    """
+    begun, seconds = work.clock.now(), 60.0 * float(step.args["minutes"])
+    if isinstance(work.controller, HostedController) and work.controller.by_hand:
+        await asyncio.sleep(work.clock.to_wall(seconds))
+    rounds = 0
+    while work.clock.now() - begun < seconds:
+        for label in step.args["poses"]:
+            await go(work, label)
+        rounds += 1
+    return Done(f"{rounds} rounds in {(work.clock.now() - begun) / 60.0:.1f} min")
+
+
 async def ensure_at(work: Work, label: str) -> None:
     """Let the machine stand at a pose: nothing to do where it does already."""
     if work.memory.standing_at != label:
