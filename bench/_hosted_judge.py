@@ -110,9 +110,9 @@ def moved_by_parameters(
     """Shifts (3, N, trials) of the platform in mm by errors drawn from the fit's covariance."""
     machine = identified.machine
     at = standpoint(identified, machine.extension(q), here, History.at_home(machine))
-    columns = pose_columns(identified, at)
-    kept = [k for k, name in enumerate(fit.model.names) if name in columns]
-    stacked = np.array([columns[fit.model.names[k]][:3] for k in kept])
+    place = {name: k for k, name in enumerate(identified.names)}
+    kept = [k for k, name in enumerate(fit.model.names) if name in place]
+    stacked = pose_columns(at)[[place[fit.model.names[k]] for k in kept], :3]
     covariance = fit.covariance[np.ix_(kept, kept)]
     drawn = generator.multivariate_normal(
         np.zeros(len(kept)), covariance, trials, method="eigh", check_valid="ignore"

@@ -252,6 +252,9 @@ def _refused(why: str) -> dict[str, Any]:
 
 
 async def _send(writer: asyncio.StreamWriter, answer: Mapping[str, Any]) -> None:
-    text = json.dumps(plain(answer), ensure_ascii=False)
+    try:
+        text = json.dumps(answer, ensure_ascii=False, allow_nan=False)
+    except (TypeError, ValueError):  # numbers that JSON cannot say, or numpy's
+        text = json.dumps(plain(answer), ensure_ascii=False)
     writer.write(text.encode("utf-8", "replace") + b"\n")
     await writer.drain()

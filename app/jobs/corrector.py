@@ -1,7 +1,8 @@
 """From wanted poses to commands, with a model from a file; nothing moves."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +18,14 @@ from calib.command import (
     Excess,
     History,
     Identified,
+    PoseCovariance,
     Surroundings,
     Trajectory,
     commands_for,
     pose_commands,
-    pose_covariance,
 )
 from calib.command.identified import why_not
+from calib.command.region import Walls
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import Poses
@@ -63,6 +65,17 @@ class Corrector:
             described, values, effects, saved.load, saved.controller
         )
         return cls(str(model), described, identified, saved, left_out)
+
+    @cached_property
+    def walls(self) -> Walls | None:
+        """The ends of where it was measured; None if the model file does not say."""
+        return None if self.saved.region is None else self.saved.region.walls(self.machine)
+
+    @cached_property
+    def covariance(self) -> PoseCovariance:
+        """How sure the model is of where the platform comes to."""
+        known = np.where(np.isfinite(self.saved.covariance), self.saved.covariance, 0.0)
+        return PoseCovariance(self.identified, list(self.saved.estimates), known)
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -127,7 +140,7 @@ class Corrector:
         if np.any(np.asarray(found.get(PAYLOAD, 0.0)) < 0.0):
             raise BadInput(f"{PAYLOAD} is negative", remedy="Give the mass on the platform, kg")
         region = self.saved.region
-        for name in self._asked_for():
+        for name in self._asked_for:
             if name in found:
                 continue
             ends = region.channels.get(name) if region is not None else None
@@ -140,9 +153,10 @@ class Corrector:
                 )
         return found
 
-    def _asked_for(self) -> Iterable[str]:
+    @cached_property
+    def _asked_for(self) -> tuple[str, ...]:
         heavy = any(PAYLOAD in f.effect.depends for f in self.identified.effects)
-        return dict.fromkeys((*self.identified.needs, *([PAYLOAD] if heavy else [])))
+        return tuple(dict.fromkeys((*self.identified.needs, *([PAYLOAD] if heavy else []))))
 
     def _who(self, channel: str) -> str:
         return next(
@@ -187,11 +201,10 @@ class Solved:
     outside: tuple[tuple[Excess, ...], ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        found, region = self.commands, self.corrector.saved.region
+        found, walls = self.commands, self.corrector.walls
         by_pose: list[list[Excess]] = [[] for _ in found.refused]
-        if region is not None:
-            machine = self.corrector.machine
-            for one in region.outside(machine, found.wanted, found.q, self.channels):
+        if walls is not None:
+            for one in walls.outside(found.wanted, found.q, self.channels):
                 by_pose[one.pose].append(one)
         object.__setattr__(self, "outside", tuple(map(tuple, by_pose)))
 
@@ -219,33 +232,34 @@ class Solved:
 
     def entries(self) -> list[dict[str, Any]]:
         """What is said of every pose; see :class:`app.jobs.correcting.CorrectedEntry`."""
-        found, corrector = self.commands, self.corrector
-        told = pose_commands(corrector.identified, found).to_xyz_rpy()
+        found, names = self.commands, self.corrector.coordinates
+        told = pose_commands(self.corrector.identified, found).to_xyz_rpy()
         stands = found.standing.poses.to_xyz_rpy()
         um, mdeg = self.uncertainty()
+        columns = (found.wanted.T, found.q.T, told.T, stands.T, um, mdeg)
         return [
             {
-                "wanted": dict(zip(corrector.coordinates, found.wanted[:, k], strict=True)),
-                "q": found.q[:, k],
-                "pose": told[:, k],
-                "stands": stands[:, k],
-                "uncertainty_um": um[k],
-                "uncertainty_mdeg": mdeg[k],
-                "outside": [str(one) for one in self.outside[k]],
+                "wanted": dict(zip(names, wanted, strict=True)),
+                "q": q,
+                "pose": pose,
+                "stands": stands_at,
+                "uncertainty_um": um_here,
+                "uncertainty_mdeg": mdeg_here,
+                "outside": [str(one) for one in outside],
             }
-            for k in range(len(found.refused))
+            for wanted, q, pose, stands_at, um_here, mdeg_here, outside in zip(
+                *(column.tolist() for column in columns), self.outside, strict=True
+            )
         ]
 
     def uncertainty(self) -> tuple[Array, Array]:
         """Standard uncertainty (N,) of place in um (3D) and of direction in mdeg."""
-        saved = self.corrector.saved
-        finite = np.where(np.isfinite(saved.covariance), saved.covariance, 0.0)
-        covariance = pose_covariance(
-            self.corrector.identified, self.commands.standing, list(saved.estimates), finite
+        covariance = self.corrector.covariance.at(self.commands.standing)
+        variance = np.einsum("iin->in", covariance)
+        place, turn = variance[:3].sum(axis=0), variance[3:].sum(axis=0)
+        return 1e3 * np.sqrt(np.maximum(place, 0.0)), 1e3 * np.rad2deg(
+            np.sqrt(np.maximum(turn, 0.0))
         )
-        place = np.sqrt(np.maximum(np.einsum("iin->n", covariance[:3, :3]), 0.0))
-        turn = np.sqrt(np.maximum(np.einsum("iin->n", covariance[3:, 3:]), 0.0))
-        return 1e3 * place, 1e3 * np.rad2deg(turn)
 
 
 def machine_of(model: Path, saved: SavedFit, named: str | None) -> Machine:

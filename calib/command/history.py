@@ -1,6 +1,6 @@
 """What a machine was commanded before: backlash, settling and creep look back on it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -65,17 +65,28 @@ class History:
             return History(self.extension[:, -LONGEST:], self.time_s[-LONGEST:])
         if self.count <= 2:
             return self
-        step = CommandedPath.of_run(self.extension, self.time_s, motion).step[:, -1]
-        last = self.extension[:, -1]
-        return History(np.stack([last - step, last], axis=1), self.time_s[-2:])
+        latest, step = self.extension[:, -1], np.zeros(motion.size)
+        after, moved = latest, np.zeros(motion.size, dtype=bool)
+        for row in range(self.count - 2, -1, -1):
+            before = self.extension[:, row]
+            change = after - before
+            now = ~moved & (np.abs(change) > motion)
+            step[now] = change[now]
+            moved |= now
+            if moved.all():
+                break
+            after = before
+        kept = np.empty((motion.size, 2))
+        kept[:, 0], kept[:, 1] = latest - step, latest
+        return History(kept, self.time_s[-2:])
 
-    def path(
-        self, extension: Array, time_s: Array, motion: Array, steps: IntArray
-    ) -> tuple[CommandedPath, IntArray]:
-        """The way to N commands (n, N), and the row on it of each.
+    def ahead(self, time_s: Array, motion: Array, steps: IntArray) -> "Ahead":
+        """N commands that come next, wherever they will be.
 
         Parameters
         ----------
+        time_s, motion : (N,), (n,)
+            When; and changes up to which they are rounding.
         steps : (N,)
             For each command the command (0..N-1) that it follows, -1 for the last of the history.
 
@@ -85,21 +96,35 @@ class History:
             If a command is told to come before what it follows.
         """
         held, count = self.count, time_s.size
-        own = held + np.arange(count, dtype=np.intp)
-        before = np.where(steps < 0, held - 1, held + steps).astype(np.intp)
-        known = CommandedPath.of_run(self.extension, self.time_s, motion)
+        before = np.maximum(steps, -1) + held  # -1: the last that is held
         times = np.concatenate([self.time_s, time_s])
-        if np.any(times[own] < times[before]):
-            late = int(np.argmax(times[own] < times[before]))
+        early = time_s < times[before]
+        if early.any():
+            late = int(np.argmax(early))
             raise BadInput(
                 f"command {late + 1} is for {time_s[late]:.6g} s, and what comes before it for "
                 f"{times[before[late]]:.6g} s",
                 remedy="Give times that do not go back",
             )
-        path = replace(
-            known,
-            extension=np.concatenate([self.extension, extension], axis=1),
-            time_s=times,
-            before=np.concatenate([known.before, before]),
-        )
-        return path, own
+        chain = np.concatenate([np.arange(-1, held - 1, dtype=np.intp), before])
+        own = np.arange(held, held + count, dtype=np.intp)
+        return Ahead(self.extension, times, chain, own, motion)
+
+
+@dataclass(frozen=True, eq=False)
+class Ahead:
+    """N commands after H of a history: extensions ``past`` (n, H), and times and order of all.
+
+    ``time_s`` and ``before`` are (H + N,), ``at`` (N,) their own places, ``motion`` (n,).
+    """
+
+    past: Array
+    time_s: Array
+    before: IntArray
+    at: IntArray
+    motion: Array
+
+    def path(self, extension: Array) -> CommandedPath:
+        """The way to them, if they are (n, N)."""
+        whole = np.concatenate([self.past, extension], axis=1)
+        return CommandedPath(whole, self.time_s, self.before, self.motion)

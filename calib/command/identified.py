@@ -33,7 +33,7 @@ class Found:
     rest: Array
     needs: tuple[str, ...]
 
-    @property
+    @cached_property
     def amplitudes(self) -> Array:
         """Linear amplitudes (U,): zero in place of what is not linear."""
         return np.where(self.linear, self.values - self.rest, 0.0)
@@ -109,16 +109,38 @@ class Identified:
         return extension, parameters
 
     @cached_property
+    def twist_lengths(self) -> Array:
+        """The same of twists, (6, 1)."""
+        return np.array([self.machine.size] * 3 + [1.0] * 3)[:, None]
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Parameters of the machine, then the unknowns of every effect."""
+        own = tuple(parameter.name for parameter in self.machine.parameters)
+        return own + tuple(name for found in self.effects for name in found.names)
+
+    @cached_property
+    def reference(self) -> Array:
+        """What the coordinates q refer to, (n, 1), mm or rad."""
+        return self.machine.reference(self.controller)[:, None]
+
+    @cached_property
+    def held_by_controller(self) -> Array:
+        """Parameters (P,) as the controller holds them."""
+        known = self.machine.parameter_index
+        return self.machine.vector({k: v for k, v in self.controller.items() if k in known})
+
+    @cached_property
     def needs(self) -> tuple[str, ...]:
         """Channels that every command must be told."""
         return tuple(dict.fromkeys(name for found in self.effects for name in found.needs))
 
-    @property
+    @cached_property
     def remembers_path(self) -> bool:
         """Whether an effect looks back on more than the last step of every actuator."""
         return any("path" in found.effect.depends for found in self.effects)
 
-    @property
+    @cached_property
     def needs_time(self) -> bool:
         """Whether an effect asks when the machine stands somewhere."""
         return any("time_s" in found.effect.depends for found in self.effects)

@@ -82,9 +82,59 @@ class Region:
             },
         )
 
-    def outside(
-        self, machine: Machine, task: Array, q: Array, channels: Mapping[str, Array]
-    ) -> list[Excess]:
+    def walls(self, machine: Machine) -> "Walls":
+        """The same prepared for many poses of a machine."""
+        free = (-np.inf, np.inf)
+        return Walls(
+            _Ends.of(
+                [
+                    (name, self.task.get(name, free), "mm" if name in "xyz" else "rad")
+                    for name in machine.task.coordinates
+                ]
+                + [(a.name, self.actuators.get(a.name, free), a.unit) for a in machine.actuators]
+            ),
+            {
+                name: _Ends.of([(name, ends, _unit_of(name))])
+                for name, ends in self.channels.items()
+            },
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Ends:
+    """Ranges of m quantities by name, range and unit; (m, 1) where they count as left."""
+
+    ranges: Sequence[tuple[str, Range, str]]
+    low: Array
+    high: Array
+
+    @classmethod
+    def of(cls, ranges: Sequence[tuple[str, Range, str]]) -> "_Ends":
+        """With what may be passed of them."""
+        spare = np.array([_spare(name, *ends) for name, ends, _ in ranges])
+        low, high = np.array([ends for _, ends, _ in ranges]).T
+        return cls(ranges, (low - spare)[:, None], (high + spare)[:, None])
+
+    def passed(self, values: Array) -> list[Excess]:
+        """What of values (m, N) is beyond."""
+        beyond = (values < self.low) | (values > self.high)
+        if not beyond.any():
+            return []
+        return [
+            Excess(int(pose), name, float(values[k, pose]), *ends, unit)
+            for k, (name, ends, unit) in enumerate(self.ranges)
+            for pose in np.flatnonzero(beyond[k])
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class Walls:
+    """The ends of all ranges: of task coordinates and actuators, and of channels by name."""
+
+    machine: _Ends
+    channels: Mapping[str, _Ends]
+
+    def outside(self, task: Array, q: Array, channels: Mapping[str, Array]) -> list[Excess]:
         """What lies outside, pose by pose.
 
         Parameters
@@ -94,23 +144,10 @@ class Region:
             over.
         channels : mapping of str to (N,)
         """
-        count, found = task.shape[1], []
-        named = {c: (task[i], self.task.get(c)) for i, c in enumerate(machine.task.coordinates)}
-        units = {c: "mm" if c in "xyz" else "rad" for c in machine.task.coordinates}
-        for k, one in enumerate(machine.actuators):
-            named[one.name], units[one.name] = (q[k], self.actuators.get(one.name)), one.unit
+        found = self.machine.passed(np.concatenate([task, q]))
         for name, values in channels.items():
-            named[name] = np.broadcast_to(values, (count,)), self.channels.get(name)
-            units[name] = _unit_of(name)
-        for name, (values, known) in named.items():
-            if known is None:
-                continue
-            low, high = known
-            spare = _spare(name, low, high)
-            passed = (values < low - spare) | (values > high + spare)
-            for pose in np.flatnonzero(passed) if passed.any() else ():
-                value = float(values[pose])
-                found.append(Excess(int(pose), name, value, low, high, units[name]))
+            if name in self.channels:
+                found += self.channels[name].passed(np.reshape(values, (1, -1)))
         return sorted(found, key=lambda one: one.pose)
 
 

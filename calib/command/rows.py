@@ -1,6 +1,8 @@
 """Rows of commands that nobody has read yet, for what effects ask of readings."""
 
 from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -19,36 +21,45 @@ def rows_at(
     path: CommandedPath,
     at: IntArray,
     channels: Mapping[str, Array],
-    controller: Mapping[str, float] | None = None,
+    reference: Array | None = None,
 ) -> Rows:
     """Rows that stand at places (N,) of a path, read without noise at the platform's origin.
 
     ``run`` says what the machine carries: :func:`empty_run`.
 
-    ``controller`` holds the controller's own parameters, to which its coordinates refer.
+    ``reference`` (n, 1) is what the coordinates refer to; that of the drawing if not given.
     """
-    count = at.size
     extension = path.extension[:, at]
     return Rows(
         machine=machine,
         runs=(run,),
-        run=np.zeros(count, dtype=np.intp),
-        line=np.arange(1, count + 1, dtype=np.intp),
-        pose_name=tuple(str(k + 1) for k in range(count)),
-        nest_name=("",) * count,
         extension=extension,
-        q=machine.coordinates(extension, controller),
+        q=machine.coordinates(extension) if reference is None else extension + reference,
         path=path,
         at=at,
         time_s=path.time_s[at],
-        progress=np.zeros(count),
-        position=np.zeros((3, count)),
-        covariance=np.repeat(np.eye(3)[:, :, None], count, axis=2),
-        nest=np.zeros((3, count)),
-        on_platform=np.ones(count, dtype=bool),
-        fold=np.full(count, -1, dtype=np.intp),
         channels=dict(channels),
+        **_blank(at.size),
     )
+
+
+@lru_cache(maxsize=16)
+def _blank(count: int) -> dict[str, Any]:
+    """What all rows of commands have in common, ``count`` of them; not to be written to."""
+    blank: dict[str, Any] = {
+        "run": np.zeros(count, dtype=np.intp),
+        "line": np.arange(1, count + 1, dtype=np.intp),
+        "progress": np.zeros(count),
+        "position": np.zeros((3, count)),
+        "covariance": np.repeat(np.eye(3)[:, :, None], count, axis=2),
+        "nest": np.zeros((3, count)),
+        "on_platform": np.ones(count, dtype=bool),
+        "fold": np.full(count, -1, dtype=np.intp),
+    }
+    for values in blank.values():
+        values.setflags(write=False)
+    names = tuple(str(k + 1) for k in range(count))
+    return {**blank, "pose_name": names, "nest_name": ("",) * count}
 
 
 def rows_with_everything(effect: Effect, machine: Machine, load: Load | None) -> Rows:

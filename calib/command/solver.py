@@ -1,37 +1,36 @@
-"""Commands that bring the platform where it is wanted: Newton on the machine as it really stands.
+"""Commands that bring the platform where it is wanted: the inverse, less what the effects add.
 
-With y the wanted task coordinates, f(s) the platform's pose at the commands s (``standing``) and
-D = df/ds of the geometry alone, each pass asks the effects once and takes
+Where the platform is wanted is where the machine has to close, but for what effects do to the
+platform itself (``aiming``): E, the extensions there. What the effects change, d, depends on where
+the machine stands, which is known, and on the commands s themselves, weakly. Each pass asks the
+effects once and takes
 
-    s <- s + (T D)^-1 (y - f(s)) - d,     T the task's rows,
+    s <- E - d,
 
-with d what the effects have changed the extensions by since the pass before. What D leaves out is
-the slope of the effects by s, some hundredths at most, so every pass wins two digits or more.
-Commands of a sequence are solved together: each looks back on those before it as they come out, so
-all that remembers agrees with what is commanded in the end.
+so every pass wins two digits or more. Commands of a sequence are solved together: each looks back
+on those before it as they come out, so all that remembers agrees with what is commanded in the end.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from calib.arrays import Array, BoolArray, IntArray
+from calib.command.aiming import Aim
+from calib.command.changes import AGREED, Changes, changes_at, unrest
+from calib.command.course import Course
 from calib.command.history import History
 from calib.command.identified import Identified
-from calib.command.standing import (
-    AGREED,
-    Standpoint,
-    command_rows,
-    one_pass,
-    without_effects,
-)
+from calib.command.standing import Standpoint
 from calib.command.surroundings import Surroundings
+from calib.command.told import Told
 from calib.errors import BadInput
 from calib.mechanism.configuration import Configuration
 from calib.mechanism.limits import violations
 from calib.mechanism.rigid import Poses
-from calib.mechanism.solve import begun_at, forward, inverse
-from calib.mechanism.task import FULL, task_error, task_rows, task_values
+from calib.mechanism.solve import begun_at, forward, home_configuration, inverse
+from calib.mechanism.task import task_values
 
 PATIENCE = 40
 """Passes without one more command of a sequence solved, after which the rest is given up."""
@@ -55,35 +54,39 @@ class Commands:
     extension, q : (n, N)
         Commanded extensions, and coordinates by the controller's own parameters; mm or rad. nan
         where ``refused`` says why.
-    poses : Poses
-        Where the machine then stands, by its model.
-    miss : (N,)
-        What is left to the wanted task coordinates, as a part of the machine's size (rad of turns).
     passes : int
         Passes taken for all together.
     refused : tuple of str, length N
         Why a pose is not commanded; empty where it is. Those are not on the way of the others.
     history : History
         What was commanded, these included in their order; of alternatives that of before.
+    standing : Standpoint
+        Where the machine then stands, by its model.
     plain : (n, N)
         Extensions by the geometry alone, mm or rad.
     trend : (n, 1)
         How what is added to it grew with it up to the last command; zero where that jumped.
+    course : Course
+        How what the effects change went on from command to command.
     """
 
     wanted: Array
     extension: Array
     q: Array
-    poses: Poses
-    miss: Array
     passes: int
     refused: tuple[str, ...]
     history: History
     standing: Standpoint
     plain: Array
     trend: Array
+    course: Course
 
     @property
+    def poses(self) -> Poses:
+        """Where the machine then stands, by its model."""
+        return self.standing.poses
+
+    @cached_property
     def solved(self) -> BoolArray:
         """Which poses can be commanded, (N,)."""
         return np.array([not why for why in self.refused], dtype=bool)
@@ -137,18 +140,26 @@ def commands_for(
     surroundings, history = surroundings or Surroundings(), history or History.at_home(machine)
     after = after if after is not None and after.solved[-1:].all() else None
     if after is not None and start is None:
-        closed = after.standing.closed
-        start = begun_at(machine, closed.take(slice(closed.count - 1, closed.count)))
+        start = after.standing.closed
+        start = start if start.count == 1 else start.take(slice(start.count - 1, start.count))
+        start = start if identified.closing is machine else begun_at(machine, start)
     plain = inverse(machine, goal, identified.parameters, start)
     if after is not None and not plain.converged.all():
         plain = inverse(machine, goal, identified.parameters)
     refused = _by_geometry(plain)
+    reachable = goal
+    if not plain.converged.all():  # the others are solved beside a pose that can be
+        home = task_values(machine.task, home_configuration(machine).poses)
+        reachable = np.where(plain.converged, goal, home)
+        plain = inverse(machine, reachable, identified.parameters)
     while True:
         steps = _steps(refused, alternatives)
-        attempt = _solved(identified, goal, surroundings, history, steps, plain, refused, after)
+        told = Told.of(identified, surroundings, history, steps)
+        attempt = _solved(told, reachable, history, plain, refused, after)
         if attempt.refused == refused:
             break
         refused = attempt.refused
+    attempt = replace(attempt, wanted=goal)
     if alternatives:
         return replace(attempt, history=history)
     return attempt
@@ -161,10 +172,8 @@ def pose_commands(identified: Identified, commands: Commands) -> Poses:
     was refused stays nan.
     """
     machine = identified.machine
-    held = machine.vector(
-        {k: v for k, v in identified.controller.items() if k in machine.parameter_index}
-    )
     solved = commands.solved
+    held = identified.held_by_controller
     found = forward(machine, np.where(solved, commands.extension, 0.0), held)
     good = solved & found.converged
     return Poses(
@@ -199,105 +208,94 @@ def _steps(refused: tuple[str, ...], alternatives: bool) -> IntArray:
 
 
 def _solved(
-    identified: Identified,
+    told: Told,
     goal: Array,
-    surroundings: Surroundings,
     history: History,
-    steps: IntArray,
     plain: Configuration,
     refused: tuple[str, ...],
     after: Commands | None,
 ) -> Commands:
     """One attempt at all poses that are not refused yet."""
+    identified, count = told.identified, goal.shape[1]
     kept = np.array([not why for why in refused], dtype=bool)
-    begin, near = plain.extension, None
-    if after is not None:
-        grown = after.trend * (plain.extension - after.plain[:, -1:])
-        begin = begin + (after.extension - after.plain)[:, -1:] + grown
-        near = after.standing.last(kept.size).growing(-grown)
+    after = after if identified.effects else None
+    before = None if after is None else _foreseen(identified, plain, after)
+    aim = Aim.at(identified, goal, plain, before)
+    begin = aim.closed.extension if before is None else aim.closed.extension - before.extension
     extension = np.where(kept, begin, history.extension[:, -1:])
+    if identified.effects:
+        trend = None if after is None else after.trend
+        near, good, passes = _settled(told, aim, extension, before, kept, trend)
+    else:
+        none = Changes(np.zeros_like(extension), None, None)
+        near = aim.standing(extension, np.zeros(count), none)
+        good, passes = plain.converged | ~kept, 1
+    why = _why(identified, near, refused, good, told.alternatives)
+    solved = np.array([not one for one in why], dtype=bool)
+    extension = np.where(solved, near.extension, np.nan)
+    q = extension + identified.reference
+    sent = History(
+        np.concatenate([history.extension, extension[:, solved]], axis=1),
+        np.concatenate([history.time_s, told.time_s[solved]]),
+    )
+    grown = _trend(identified, extension, plain.extension, after)
+    course = Course.after(near.changes, None if after is None else after.course)
+    return Commands(goal, extension, q, passes, why, sent, near, plain.extension, grown, course)
+
+
+def _foreseen(identified: Identified, plain: Configuration, after: Commands) -> Changes:
+    """What the effects are taken to change at first, by what they did before."""
+    if plain.count == 1:
+        return after.course.next(identified.motion[:, None])
+    grown = after.trend * (plain.extension - after.plain[:, -1:])
+    return after.standing.changes.last(plain.count).growing(-grown)
+
+
+def _settled(
+    told: Told,
+    aim: Aim,
+    extension: Array,
+    before: Changes | None,
+    kept: BoolArray,
+    trend: Array | None,
+) -> tuple[Standpoint, BoolArray, int]:
+    """Ask effects and take what they say off, until they say the same; which did, passes taken."""
+    identified = told.identified
     passes = best = waited = 0
     while True:
-        if identified.effects:
-            rows = command_rows(identified, extension, surroundings, history, steps)
-            near = one_pass(identified, rows, near, plain)
-        else:
-            near = without_effects(
-                identified, extension, surroundings, history, steps, near.closed if near else plain
-            )
-        error = _error(identified, goal, near)
-        miss = _size(identified, error)
-        good = near.agreed & (miss <= AGREED) | ~kept
+        changes = changes_at(identified, aim.situation(told.rows(extension)))
+        moved = unrest(identified, changes, before)
+        good = aim.closed.converged & (moved <= AGREED) | ~kept
         passes += 1
-        done = int(good.sum()) if np.all(steps < 0) else int(np.logical_and.accumulate(good).sum())
+        ready = good if told.alternatives else np.logical_and.accumulate(good)
+        done = int(np.count_nonzero(ready))
         waited = 0 if done > best else waited + 1
         best = max(best, done)
-        if good.all() or waited > PATIENCE:
-            break
-        step = _towards(identified, error, near) - near.drift
-        if after is not None:  # what effects add grows with it as it did
-            near = near.growing(-after.trend * np.where(np.isfinite(step), step, 0.0))
-            step = (1.0 + after.trend) * step
-        moved = extension + np.where(kept, step, 0.0)
-        extension = np.where(np.isfinite(moved), moved, extension)
-    why = _why(identified, near, refused, good, steps)
-    solved = np.array([not one for one in why], dtype=bool)
-    extension = np.where(solved, extension, np.nan)
-    times = surroundings.times(goal.shape[1])
-    q = identified.machine.coordinates(extension, identified.controller)
-    told = History(
-        np.concatenate([history.extension, extension[:, solved]], axis=1),
-        np.concatenate([history.time_s, times[solved]]),
-    )
-    trend = _trend(identified, extension, plain.extension, after)
-    return Commands(
-        goal, extension, q, near.poses, miss, passes, why, told, near, plain.extension, trend
-    )
+        if done == good.size or waited > PATIENCE:
+            return aim.standing(extension, moved, changes), good, passes
+        aim = aim.moved(changes)
+        step = aim.closed.extension - changes.extension - extension
+        step = np.where(kept & np.isfinite(step), step, 0.0)
+        before = changes
+        if trend is not None:  # what effects add grows with it as it did
+            before = changes.growing(-trend * step)
+            step = (1.0 + trend) * step
+        extension = extension + step
 
 
 def _trend(identified: Identified, extension: Array, plain: Array, after: Commands | None) -> Array:
     """:attr:`Commands.trend` by the last two commands, those before included."""
-    if after is not None and plain.shape[1] == 1:
-        extension = np.concatenate([after.extension[:, -1:], extension], axis=1)
-        plain = np.concatenate([after.plain[:, -1:], plain], axis=1)
-    if plain.shape[1] < 2:
-        return np.zeros((plain.shape[0], 1))
-    way = plain[:, -1] - plain[:, -2]
-    grown = extension[:, -1] - extension[:, -2] - way
-    with np.errstate(invalid="ignore"):
-        smooth = (np.abs(way) > identified.motion) & (np.abs(grown) <= STEEPEST * np.abs(way))
-        return np.asarray(np.where(smooth, grown / np.where(smooth, way, 1.0), 0.0)[:, None])
-
-
-def _error(identified: Identified, goal: Array, near: Standpoint) -> Array:
-    """What is left to the wanted task coordinates, (k, N)."""
-    task = identified.machine.task
-    return np.asarray(task_error(task, goal, near.poses.position, near.poses.rotation))
-
-
-def _size(identified: Identified, error: Array) -> Array:
-    """Largest of it, lengths as parts of the machine's size, (N,)."""
-    machine = identified.machine
-    unit = np.array([machine.size if name in "xyz" else 1.0 for name in machine.task.coordinates])
-    return np.asarray(np.max(np.abs(error) / unit[:, None], axis=0))
-
-
-def _towards(identified: Identified, error: Array, near: Standpoint) -> Array:
-    """Step (n, N) of the commands that takes the error away by the geometry alone."""
-    task = identified.machine.task
-    if task.coordinates == FULL:
-        slope = near.twists.transpose(2, 1, 0)
-    else:
-        slope = np.einsum("tcn,acn->nta", task_rows(task, near.poses.rotation), near.twists)
-    finite = np.asarray(np.isfinite(slope).all(axis=(1, 2)) & np.isfinite(error).all(axis=0))
-    slope = np.where(finite[:, None, None], slope, np.eye(*slope.shape[1:]))
-    wanted = np.where(finite, error, 0.0)
-    if slope.shape[1] == slope.shape[2]:
-        try:
-            return np.asarray(np.linalg.solve(slope, wanted.T[:, :, None])[:, :, 0].T)
-        except np.linalg.LinAlgError:
-            pass  # singular to the last digit: the smallest step will do
-    return np.asarray(np.einsum("nat,tn->an", np.linalg.pinv(slope), wanted))
+    last, begun = (extension[:, -2:-1], plain[:, -2:-1])
+    if plain.shape[1] == 1:
+        if after is None:
+            return np.zeros_like(plain)
+        last, begun = after.extension[:, -1:], after.plain[:, -1:]
+    way = plain[:, -1:] - begun
+    grown = extension[:, -1:] - last - way
+    length = np.abs(way)
+    smooth = (length > identified.motion[:, None]) & (np.abs(grown) <= STEEPEST * length)
+    way[~smooth] = 1.0
+    return np.asarray(np.where(smooth, grown / way, 0.0))
 
 
 def _why(
@@ -305,7 +303,7 @@ def _why(
     near: Standpoint,
     refused: tuple[str, ...],
     good: BoolArray,
-    steps: IntArray,
+    alternatives: bool,
 ) -> tuple[str, ...]:
     """Why poses are not commanded; where a sequence got stuck, nothing after it is."""
     why = list(refused)
@@ -313,7 +311,7 @@ def _why(
         stuck = np.flatnonzero(~good)
         for row in stuck:
             why[row] = STUCK if near.closed.converged[row] else UNREACHABLE
-        if not np.all(steps < 0):
+        if not alternatives:
             after = range(stuck[0] + 1, good.size)
             why[stuck[0] + 1 :] = [why[row] if refused[row] else BEHIND for row in after]
         return tuple(why)

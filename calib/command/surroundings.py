@@ -1,5 +1,6 @@
 """What a command must know beside the pose: load, temperatures, time."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -42,7 +43,7 @@ class Surroundings:
 
 
 def _spread(value: float | Array, count: int, name: str) -> Array:
-    if isinstance(value, float | int) and np.isfinite(value):
+    if isinstance(value, float | int) and math.isfinite(value):
         return np.full(count, float(value))
     values = np.asarray(value, dtype=np.float64)
     if values.ndim and values.shape != (count,):

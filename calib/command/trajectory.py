@@ -1,8 +1,8 @@
 """Commands for a machine that is streamed: poses at a rate, block after block.
 
-Each block begins where the one before ended, with what the effects made of its last command: a few
-passes for all its poses together, and steps smaller than a lost motion keep their direction. Poses
-that are known ahead cost tens of microseconds each in blocks of fifty, one alone some passes.
+Each block begins where the one before ended, with what the effects made of its last commands: a
+few passes for all its poses together, and steps smaller than a lost motion keep their direction.
+Of single poses the effects are asked once where steps are small and even, else twice.
 """
 
 from collections.abc import Iterator

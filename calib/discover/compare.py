@@ -11,7 +11,6 @@ from calib.evidence.compare import JointTest, Speaking, compare_structure
 from calib.evidence.repeats import PureError, pure_error
 from calib.evidence.structure import Response, Variable
 from calib.identify.fitting import Fit
-from calib.mechanism.axes import units_of
 from calib.mechanism.rigid import rotate
 
 TOLD_APART = 100.0
@@ -123,7 +122,7 @@ def _steps(fit: Fit) -> list[Variable]:
     """Size of the last step: of all actuators together, or of each where their units differ."""
     rows = fit.model.rows
     steps = np.tile(rows.step[:, fit.accepted], (1, 3))
-    if len(units_of(rows.machine.axes)) == 1:
+    if len(rows.machine.axes_by_unit) == 1:
         return [Variable("step", steps, (every_leg(fit),))]
     return [
         Variable(f"step{k + 1}", step, (leg,))

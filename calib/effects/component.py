@@ -284,6 +284,6 @@ def alone(count: int, each: int = 1) -> tuple[tuple[int, ...], ...]:
 def per_actuator(shape: Array) -> Array:
     """One unknown for each actuator: (n, N) -> (n, n, N) with ``shape`` on the diagonal."""
     count = shape.shape[0]
-    spread = np.zeros((count, *shape.shape))
-    spread[np.arange(count), np.arange(count)] = shape
-    return spread
+    spread = np.zeros((count * count, shape.shape[1]))
+    spread[:: count + 1] = shape
+    return spread.reshape(count, count, -1)

@@ -14,11 +14,10 @@ import numpy as np
 from calib.arrays import Array, BoolArray
 from calib.effects.component import Effect, Signature, Situation, alone
 from calib.effects.link_weight import link_forces, link_mass_kg
-from calib.mechanism.axes import units_of
 from calib.mechanism.closure import Closure, Standing
 from calib.mechanism.compiled import compile_machine
 from calib.mechanism.description import Machine
-from calib.mechanism.rigid import cross, rotate
+from calib.runs.header import Load
 from calib.runs.stack import Rows
 from calib.unknown import Unknown
 
@@ -32,30 +31,35 @@ WEIGHT_UPWARDS = (
 def actuator_forces(situation: Situation) -> Array:
     """Force (N) or torque (N mm) that the weight puts into each actuator, shape (n, N)."""
     rows = situation.rows
-    force, moment = weight_wrench(rows, situation.rotation)
-    twists = situation.actuator_twists
-    forces: Array = np.einsum("icr,cr->ir", twists[:, :3], force)
-    forces += np.einsum("icr,cr->ir", twists[:, 3:], moment)
-    return forces + link_forces(rows)
+    wrench = np.concatenate(weight_wrench(rows, situation.rotation))
+    forces: Array = np.einsum("icr,cr->ir", situation.actuator_twists, wrench)
+    return forces + link_forces(rows) if link_mass_kg(rows.machine) else forces
 
 
 def weight_wrench(rows: Rows, rotation: Array) -> tuple[Array, Array]:
     """Force (3, N) in N and moment (3, N) in N mm about the platform's origin, base axes."""
-    payload = rows.channels.get("payload_kg", np.zeros(rows.count))
+    payload = rows.channels.get("payload_kg")
+    carried = np.zeros(rows.count) if payload is None else payload
+    if len(rows.runs) == 1:
+        return _weighs(rows.runs[0].header.load, carried, rotation)
     force, moment = np.zeros((3, rows.count)), np.zeros((3, rows.count))
     for index, run in enumerate(rows.runs):
-        load, here = run.header.load, rows.run == index
-        if load is None:
-            continue
-        turned = rotation[:, :, here]
-        for mass, centre in (
-            (np.full(int(here.sum()), load.platform_mass_kg), load.platform_com),
-            (payload[here], load.payload_com),
-        ):
-            weight = mass * load.gravity[:, None]
-            force[:, here] += weight
-            moment[:, here] += cross(rotate(turned, centre[:, None]), weight)
+        here = np.flatnonzero(rows.run == index)
+        force[:, here], moment[:, here] = _weighs(
+            run.header.load, carried[here], rotation[:, :, here]
+        )
     return force, moment
+
+
+def _weighs(load: Load | None, payload: Array, rotation: Array) -> tuple[Array, Array]:
+    """The same of one run."""
+    if load is None:
+        return np.zeros((3, payload.size)), np.zeros((3, payload.size))
+    mass, (x, y, z) = load.platform_mass_kg, load.gravity.tolist()
+    lever = (mass * load.platform_com)[:, None] + payload * load.payload_com[:, None]
+    arm = np.einsum("ijn,jn->in", rotation, lever)
+    across = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])  # across @ v = v x gravity
+    return (mass + payload) * load.gravity[:, None], across @ arm
 
 
 def weightless(rows: Rows) -> str:
@@ -118,7 +122,7 @@ class GravitySag(Effect):
         if spring_compliance(rows.machine):
             return (Unknown("gravity-sag.c", "mm/N", 1e-4),)
         axes = rows.machine.axes
-        units = units_of(axes)
+        units = rows.machine.axes_by_unit
         first = [axes[own[0]] for own in units.values()]
         return tuple(
             Unknown(
@@ -140,7 +144,9 @@ class GravitySag(Effect):
         if spring:
             wrench = weight_wrench(situation.rows, situation.rotation)
             return Signature(twist=given_way(situation, *wrench)[None] / spring)
-        forces, units = actuator_forces(situation), units_of(situation.machine.axes)
+        forces, units = actuator_forces(situation), situation.machine.axes_by_unit
+        if len(units) == 1:
+            return Signature(extension=forces[None])
         shape = np.zeros((len(units), *forces.shape))
         for number, own in enumerate(units.values()):
             shape[number, own] = forces[own]

@@ -15,7 +15,7 @@ import numpy as np
 from calib.arrays import Array, BoolArray, IntArray
 from calib.effects.component import Effect, Signature, Situation, alone
 from calib.effects.gravity_sag import given_way, spring_compliance, under_load, weightless
-from calib.mechanism.axes import Axis, units_of
+from calib.mechanism.axes import Axis
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.rigid import cross
@@ -98,7 +98,7 @@ def _moments(rows: Rows, rotation: Array, axes: tuple[int, ...]) -> Array:
 
 def _yielding(machine: Machine) -> tuple[Axis, IntArray]:
     """Those that give way, and the first of them: where some slide and some turn, the latter."""
-    own = list(units_of(machine.axes).values())[-1]
+    own = list(machine.axes_by_unit.values())[-1]
     return machine.axes[own[0]], own
 
 

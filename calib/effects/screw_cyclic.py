@@ -12,7 +12,6 @@ import numpy as np
 
 from calib.arrays import Array, IntArray
 from calib.effects.component import Effect, Scan, Signature, Situation, alone, per_actuator
-from calib.mechanism.axes import units_of
 from calib.mechanism.description import Machine
 from calib.runs.stack import Rows
 from calib.unknown import Unknown
@@ -32,7 +31,7 @@ class ScrewCyclic(Effect):
 
     def axes(self, machine: Machine) -> IntArray:
         """The actuators that may err, by index: all of the first unit, linear before rotary."""
-        return next(iter(units_of(machine.axes).values()))
+        return next(iter(machine.axes_by_unit.values()))
 
     def hard_to_see(self, machine: Machine, extension: Array) -> str:
         """No actuator goes through a period: its wave is then much like a gain and an offset."""
@@ -95,14 +94,13 @@ class ScrewCyclic(Effect):
         given = self.given_period(situation.machine)
         period = float(values[-1]) if given is None else given
         phase = 2.0 * np.pi * s[which] / period
-        n = which.size
+        n, sines, cosines = which.size, np.sin(phase), np.cos(phase)
         shape = np.zeros((2 * n + (given is None), *s.shape))
-        own = np.arange(n)
-        shape[2 * own, which] = np.sin(phase)
-        shape[2 * own + 1, which] = np.cos(phase)
+        own = 2 * np.arange(n)
+        shape[own, which], shape[own + 1, which] = sines, cosines
         if given is None:
             sine, cosine = values[0 : 2 * n : 2, None], values[1 : 2 * n : 2, None]
-            slope = sine * np.cos(phase) - cosine * np.sin(phase)
+            slope = sine * cosines - cosine * sines
             shape[-1, which] = -slope * phase / period
         return Signature(extension=shape)
 
@@ -122,12 +120,12 @@ class EncoderCyclic(ScrewCyclic):
 
     def lacking(self, machine: Machine) -> str:
         """Linear and rotary actuators must be mixed."""
-        mixed = len(units_of(machine.axes)) > 1
+        mixed = len(machine.axes_by_unit) > 1
         return "" if mixed else "its actuators are of one kind: screw-cyclic is theirs"
 
     def axes(self, machine: Machine) -> IntArray:
         """The rotary actuators, by index."""
-        return units_of(machine.axes)["rad"]
+        return machine.axes_by_unit["rad"]
 
 
 EFFECTS = (ScrewCyclic(), EncoderCyclic())

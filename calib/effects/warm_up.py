@@ -38,7 +38,7 @@ class WarmUp(Effect):
 
         With several runs each has its own amplitudes, by number.
         """
-        units = units_of(rows.machine.axes)
+        units = rows.machine.axes_by_unit
         axes = rows.machine.axes
         amplitudes = tuple(
             Unknown(

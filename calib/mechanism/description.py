@@ -13,9 +13,9 @@ from typing import Literal
 
 import numpy as np
 
-from calib.arrays import Array, BoolArray
+from calib.arrays import Array, BoolArray, IntArray
 from calib.errors import BadInput
-from calib.mechanism.axes import Axis, axes_of
+from calib.mechanism.axes import Axis, axes_of, units_of
 from calib.mechanism.traits import NO_TRAITS, Traits
 
 Kind = Literal["parameter", "actuator", "passive"]
@@ -200,6 +200,11 @@ class Machine:
         return axes_of(self.actuators, self.limbs)
 
     @cached_property
+    def axes_by_unit(self) -> Mapping[str, IntArray]:
+        """Unit -> indices of the axes in it, linear ones first."""
+        return units_of(self.axes)
+
+    @cached_property
     def home_q(self) -> Array:
         """Actuator coordinates at home, shape (n,)."""
         return np.array([a.home for a in self.actuators])
@@ -213,6 +218,12 @@ class Machine:
     def joint_limits(self) -> Array:
         """Limits of the passive coordinates, shape (n_joints, 2)."""
         return np.array([joint.limits for joint in self.joints]).reshape(-1, 2)
+
+    @cached_property
+    def limits(self) -> tuple[Array, Array]:
+        """Lower and upper ends of actuators and passive coordinates together, (n + n_joints, 1)."""
+        ends = np.concatenate([self.q_limits, self.joint_limits])
+        return ends[:, :1].copy(), ends[:, 1:].copy()
 
     def index(self, name: str) -> int:
         """Position of a parameter; raises :class:`BadInput` for an unknown name."""

@@ -66,11 +66,16 @@ def violations(
 
     The limits are those that ``margin`` leaves.
     """
+    q = machine.coordinates(configuration.extension, controller)
+    if margin is None and configuration.converged.all():
+        values = np.concatenate([q, configuration.passive])
+        low, high = machine.limits
+        if ((values >= low) & (values <= high)).all():
+            return []
     found = [
         Violation(int(i), "the pose cannot be reached: the limbs do not close", np.nan, 0, 0, "")
         for i in np.flatnonzero(~configuration.converged)
     ]
-    q = machine.coordinates(configuration.extension, controller)
     low, high = _stroke(machine, margin)
     passed = _excess(q, low, high) & configuration.converged
     if passed.any():

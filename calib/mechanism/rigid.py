@@ -50,7 +50,7 @@ def from_euler(rx: Numbers, ry: Numbers, rz: Numbers) -> Numbers:
 def to_euler(R: Array) -> Array:
     """Angles rx, ry, rz (3, ...) in rad of R = Rz Ry Rx; ry in [-pi/2, pi/2]."""
     ry = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))
-    return np.stack([np.arctan2(R[2, 1], R[2, 2]), ry, np.arctan2(R[1, 0], R[0, 0])])
+    return np.array([np.arctan2(R[2, 1], R[2, 2]), ry, np.arctan2(R[1, 0], R[0, 0])])
 
 
 def euler_rates(R: Array) -> Array:

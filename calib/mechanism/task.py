@@ -7,7 +7,9 @@ from calib.mechanism.description import Task
 from calib.mechanism.rigid import (
     Poses,
     euler_rates,
+    exponential,
     from_euler,
+    product,
     small_rotation,
     to_euler,
 )
@@ -52,6 +54,26 @@ def task_error(task: Task, target: Numbers, position: Numbers, rotation: Numbers
             component = np.sin(values["tilt"]) * swing(values["azimuth"])
             out.append(component - rotation[0 if name == "tilt" else 1, 2])
     return np.stack(out)
+
+
+def task_moved(task: Task, target: Array, by: Array) -> Array:
+    """Task coordinates (n, N) beside ``target``: :func:`task_error` from there to them is ``by``.
+
+    Where a direction is moved to more than a quarter turn from z there are none: nan.
+    """
+    if task.coordinates == FULL:
+        turned = product(exponential(by[3:]), from_euler(*target[3:]))
+        return np.concatenate([target[:3] + by[:3], to_euler(turned)])
+    moved = target + by
+    index = {name: i for i, name in enumerate(task.coordinates)}
+    if "tilt" in index:
+        tilt, azimuth = index["tilt"], index["azimuth"]
+        level = np.sin(target[tilt])
+        x = level * np.cos(target[azimuth]) + by[tilt]
+        y = level * np.sin(target[azimuth]) + by[azimuth]
+        with np.errstate(invalid="ignore"):
+            moved[tilt], moved[azimuth] = np.arcsin(np.hypot(x, y)), np.arctan2(y, x)
+    return np.asarray(moved)
 
 
 def task_rows(task: Task, rotation: Numbers) -> Numbers:

@@ -79,17 +79,20 @@ class CommandedPath:
     @cached_property
     def change(self) -> Array:
         """Change of extension (n, M) since the row before; 0 at the start and for rounding."""
-        change = self.extension - self.extension[:, np.maximum(self.before, 0)]
-        moved = (self.before >= 0) & (np.abs(change) > self.motion[:, None])
-        return np.where(moved, change, 0.0)
+        begins = self.before < 0
+        change = self.extension - self.extension[:, np.where(begins, 0, self.before)]
+        moved = np.abs(change) > self.motion[:, None]
+        return np.where(moved & ~begins, change, 0.0)
 
     @cached_property
     def step(self) -> Array:
         """Last change of each actuator (n, M) up to a row, with its sign; 0 before the first."""
         change, rows = self.change, np.arange(self.count)
-        if np.array_equal(self.before[self.before >= 0], rows[self.before >= 0] - 1):
-            there = np.where((change != 0.0) | (self.before < 0), rows, 0)
-            return np.take_along_axis(change, np.maximum.accumulate(there, axis=1), axis=1)
+        begins = self.before < 0
+        if (begins | (self.before == rows - 1)).all():
+            there = np.where((change != 0.0) | begins, rows, 0)
+            latest = np.maximum.accumulate(there, axis=1)
+            return change[np.arange(len(change))[:, None], latest]
         return self.carry(
             np.zeros_like(change),
             lambda last, row: np.where(change[:, row] != 0.0, change[:, row], last),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from command_cases import drawn, machine_of, wanted_of
 
-from calib.command import Region, commands_for, pose_covariance, standpoint
+from calib.command import PoseCovariance, Region, commands_for, standpoint
 from calib.command.uncertainty import pose_columns
 from calib.effects import catalogue
 from calib.identify import fit
@@ -31,7 +31,7 @@ def test_command_region_is_where_the_poses_of_the_fit_were(measured):
     assert region.poses == 12
     for k, name in enumerate(machine.task.coordinates):
         assert np.allclose(region.task[name], [poses.task[k].min(), poses.task[k].max()], atol=0.05)
-    assert region.outside(machine, poses.task, poses.q, {}) == []
+    assert region.walls(machine).outside(poses.task, poses.q, {}) == []
 
 
 def test_command_outside_is_told_with_how_far(measured):
@@ -40,14 +40,14 @@ def test_command_outside_is_told_with_how_far(measured):
     task = poses.task[:, :2].copy()
     low, high = region.task["z"]
     task[2] = high + 0.09 * (high - low), low - 0.5 * (high - low)
-    one, *more = region.outside(machine, task, np.full((6, 2), np.nan), {})
+    one, *more = region.walls(machine).outside(task, np.full((6, 2), np.nan), {})
     assert more == []
     assert (one.pose, one.name) == (1, "z")
     assert one.beyond == pytest.approx(0.5 * (high - low))
     assert f"z is {one.beyond:.4g} mm beyond what was measured ({low:.6g} to" in str(one)
     task = poses.task[:, :1].copy()
     task[5] = region.task["rz"][1] + np.deg2rad(40.0)
-    (turned,) = region.outside(machine, task, poses.q[:, :1], {})
+    (turned,) = region.walls(machine).outside(task, poses.q[:, :1], {})
     assert str(turned).startswith("rz is 40 deg beyond")
 
 
@@ -56,7 +56,7 @@ def test_command_columns_of_a_pose_are_differences_of_where_it_stands():
     effects = [e for e in catalogue(machine) if e.id in ("screw-twist", "screw-pitch")]
     identified = drawn(machine, effects, generator)
     found = commands_for(identified, wanted_of("hexapod"))
-    columns = pose_columns(identified, found.standing)
+    columns = dict(zip(identified.names, pose_columns(found.standing), strict=True))
 
     def moved(name, step):
         if name in machine.parameter_index:
@@ -76,6 +76,6 @@ def test_command_columns_of_a_pose_are_differences_of_where_it_stands():
         slope = pose_difference(back, ahead) / (2.0 * step)
         assert np.allclose(columns[name], slope, rtol=2e-2, atol=2e-2 * np.abs(slope).max())
     names, sigma = ["leg2.B_x", "frame.x"], np.array([0.1, 5.0])
-    covariance = pose_covariance(identified, found.standing, names, np.diag(sigma**2))
+    covariance = PoseCovariance(identified, names, np.diag(sigma**2)).at(found.standing)
     own = columns["leg2.B_x"] * 0.1
     assert np.allclose(covariance, own[:, None] * own[None], atol=1e-15)

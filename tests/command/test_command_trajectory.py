@@ -41,11 +41,12 @@ def test_trajectory_in_blocks_is_the_trajectory(block: int) -> None:
     np.testing.assert_allclose(np.concatenate([p.q for p in parts], axis=1), whole.q, atol=1e-6)
 
 
-def test_a_stream_of_single_poses_asks_the_effects_twice_each() -> None:
-    machine, wanted = identified(), circle(24)
+@pytest.mark.parametrize(("of", "asked"), [(4000, 1), (400, 2)])
+def test_a_stream_of_single_poses_asks_the_effects_once_or_twice_each(of: int, asked: int) -> None:
+    machine, wanted = identified(), circle(24, of)  # 0.016 and 0.16 mm a pose
     way = Trajectory(machine)
     alone = [way.solve(wanted[:, [k]], HERE) for k in range(24)]
-    assert np.median([one.passes for one in alone[4:]]) == 2
+    assert np.median([one.passes for one in alone[4:]]) == asked
     for one in alone[4:]:  # and what the machine then stands at is what was wanted
         at = standpoint(machine, one.extension, HERE, one.history)
         np.testing.assert_allclose(at.poses.to_xyz_rpy(), one.wanted, atol=1e-7)
