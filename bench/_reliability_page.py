@@ -5,12 +5,12 @@ before is replaced; the text around the tables is written by hand.
 """
 
 import re
-import subprocess
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+from bench._page_table import ROOT, commit
+
 PAGE = ROOT / "docs" / "reliability.md"
 HEAD = "| what ran | what came of it | command | date | of |\n|---|---|---|---|---|\n"
 
@@ -37,20 +37,6 @@ def write_row(table: str, row: Row, page: Path = PAGE) -> None:
         if line.strip() and f"| `bench {row.command}` |" not in line
     ]
     today = datetime.now(UTC).date().isoformat()
-    kept.append(f"| {row.ran} | {row.found} | `bench {row.command}` | {today} | {_commit()} |")
+    kept.append(f"| {row.ran} | {row.found} | `bench {row.command}` | {today} | {commit()} |")
     new = f"{found[1]}{HEAD}" + "\n".join(kept) + f"\n{found[3]}"
     page.write_text(text[: found.start()] + new + text[found.end() :], encoding="utf-8")
-
-
-def _commit() -> str:
-    """The commit that was run, with a plus where files differed from it."""
-
-    def git(*words: str) -> str:
-        done = subprocess.run(
-            ["git", *words], cwd=ROOT, capture_output=True, text=True, check=False
-        )
-        return done.stdout.strip()
-
-    return git("rev-parse", "--short", "HEAD") + (
-        "+" if git("status", "--porcelain", "-uno") else ""
-    )

@@ -1,7 +1,6 @@
 """Rows of the table of speed: one kind of work, by numpy, by the core, and by a peer."""
 
 import os
-import resource
 import subprocess
 import sys
 import time
@@ -221,9 +220,3 @@ def monte_carlo() -> Iterator[Row]:
         f"`pkmcal identifiability --monte-carlo {DRAWS}`, two processes, CPU of both",
         old, new, one, "the same by one process", "s",
     )  # fmt: skip
-
-
-def load() -> str:
-    """What else this computer did."""
-    own = resource.getrusage(resource.RUSAGE_SELF)
-    return f"load {os.getloadavg()[0]:.0f}, {own.ru_utime + own.ru_stime:.0f} s of CPU here"

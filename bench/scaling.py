@@ -12,7 +12,6 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
-import re
 import resource
 import time
 from collections.abc import Callable, Iterator
@@ -22,6 +21,7 @@ from multiprocessing import active_children
 from pathlib import Path
 
 import pkmcal
+from bench._page_table import put
 
 HEAD = "| study | one process | two processes | started | load |\n| --- | --- | --- | --- | --- |"
 
@@ -100,11 +100,7 @@ def main() -> None:
         found.append(row)
         print(row, flush=True)
     if options.page is not None:
-        text = options.page.read_text(encoding="utf-8")
-        table = "\n".join([HEAD, *found])
-        pattern = re.compile(r"(<!-- scaling -->\n).*?(<!-- end -->)", re.DOTALL)
-        whole = pattern.sub(lambda marks: f"{marks[1]}\n{table}\n\n{marks[2]}", text)
-        options.page.write_text(whole, encoding="utf-8")
+        put(options.page, "scaling", "\n".join([HEAD, *found]))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,8 @@
 """From wanted poses to commands, with a model from a file; nothing moves."""
 
+import gc
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -29,6 +31,7 @@ from calib.command.region import Walls
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import Poses
+from calib.mechanism.solve import home_configuration
 from calib.mechanism.task import FULL, task_values
 
 PAYLOAD, TEMPERATURE = "payload_kg", "structure_temp_C"
@@ -105,6 +108,18 @@ class Corrector:
         s = machine.extension(machine.home_q[:, None], self.identified.controller)
         return History.at(s[:, 0])
 
+    def warm_up(self) -> None:
+        """Answer for the pose at home once, whatever its channels are: what is kept is made then.
+
+        Nothing is told of it, and what was made is not looked at for garbage any more.
+        """
+        home = task_values(self.machine.task, home_configuration(self.machine).poses)
+        told = {name: 20.0 if name.endswith("_C") else 0.0 for name in self._asked_for}
+        with suppress(BadInput):  # a formula may have no value there
+            self.solve(home, told, 0.0, Trajectory(self.identified, self.history())).entries()
+        gc.collect()
+        gc.freeze()
+
     def task_of(self, values: Sequence[float], place: str = "") -> Array:
         """Task coordinates (k,) of a pose: k numbers, or the six of a whole pose.
 
@@ -137,7 +152,8 @@ class Corrector:
             For a channel that an effect depends on and that nobody tells.
         """
         found = dict(told)
-        if np.any(np.asarray(found.get(PAYLOAD, 0.0)) < 0.0):
+        payload = found.get(PAYLOAD, 0.0)
+        if payload < 0.0 if isinstance(payload, float) else np.any(np.asarray(payload) < 0.0):
             raise BadInput(f"{PAYLOAD} is negative", remedy="Give the mass on the platform, kg")
         region = self.saved.region
         for name in self._asked_for:

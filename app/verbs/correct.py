@@ -199,6 +199,7 @@ async def _serve(corrector: "Corrector", port: int, as_json: bool) -> None:
     def end(*_: Any) -> None:
         loop.call_soon_threadsafe(ended.set)
 
+    corrector.warm_up()
     before = {n: signal.signal(n, end) for n in (signal.SIGINT, signal.SIGTERM)}
     try:
         chosen = await server.start()

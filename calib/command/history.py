@@ -1,6 +1,7 @@
 """What a machine was commanded before: backlash, settling and creep look back on it."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -23,15 +24,20 @@ class History:
         Commanded extensions s = q - reference, mm or rad.
     time_s : (H,)
         When it was told so, s.
+    step : (n, H) or None
+        Last change of every actuator up to each, as :class:`CommandedPath` has it; None where it
+        has not been looked at yet.
     """
 
     extension: Array
     time_s: Array
+    step: Array | None = None
 
     @classmethod
     def at(cls, extension: Array, time_s: float = 0.0) -> "History":
         """A machine that stands at an extension (n,), nothing known of how it came there."""
-        return cls(np.array(extension, dtype=np.float64)[:, None], np.array([time_s]))
+        place = np.array(extension, dtype=np.float64)[:, None]
+        return cls(place, np.array([time_s]), np.zeros_like(place))
 
     @classmethod
     def at_home(cls, machine: Machine) -> "History":
@@ -76,9 +82,9 @@ class History:
             if moved.all():
                 break
             after = before
-        kept = np.empty((motion.size, 2))
-        kept[:, 0], kept[:, 1] = latest - step, latest
-        return History(kept, self.time_s[-2:])
+        kept, steps = np.empty((motion.size, 2)), np.zeros((motion.size, 2))
+        kept[:, 0], kept[:, 1], steps[:, 1] = latest - step, latest, step
+        return History(kept, self.time_s[-2:], steps)
 
     def ahead(self, time_s: Array, motion: Array, steps: IntArray) -> "Ahead":
         """N commands that come next, wherever they will be.
@@ -108,14 +114,15 @@ class History:
             )
         chain = np.concatenate([np.arange(-1, held - 1, dtype=np.intp), before])
         own = np.arange(held, held + count, dtype=np.intp)
-        return Ahead(self.extension, times, chain, own, motion)
+        return Ahead(self.extension, times, chain, own, motion, self.step)
 
 
 @dataclass(frozen=True, eq=False)
 class Ahead:
     """N commands after H of a history: extensions ``past`` (n, H), and times and order of all.
 
-    ``time_s`` and ``before`` are (H + N,), ``at`` (N,) their own places, ``motion`` (n,).
+    ``time_s`` and ``before`` are (H + N,), ``at`` (N,) their own places, ``motion`` (n,), ``step``
+    that of the history.
     """
 
     past: Array
@@ -123,8 +130,27 @@ class Ahead:
     before: IntArray
     at: IntArray
     motion: Array
+    step: Array | None
 
     def path(self, extension: Array) -> CommandedPath:
         """The way to them, if they are (n, N)."""
         whole = np.concatenate([self.past, extension], axis=1)
+        if self.step is not None and self.at.size == 1:
+            return _OneMore(whole, self.time_s, self.before, self.motion, self.step)
         return CommandedPath(whole, self.time_s, self.before, self.motion)
+
+
+@dataclass(frozen=True, eq=False)
+class _OneMore(CommandedPath):
+    """A way of M rows whose steps are known up to the last row: (n, M - 1)."""
+
+    known: Array
+
+    @cached_property
+    def step(self) -> Array:
+        """As of any way."""
+        before = self.before[-1]
+        change = self.extension[:, -1] - self.extension[:, before]
+        moved = np.abs(change) > self.motion
+        latest = np.where(moved, change, self.known[:, before])
+        return np.concatenate([self.known, latest[:, None]], axis=1)

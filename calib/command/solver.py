@@ -64,10 +64,12 @@ class Commands:
         Where the machine then stands, by its model.
     plain : (n, N)
         Extensions by the geometry alone, mm or rad.
-    trend : (n, 1)
-        How what is added to it grew with it up to the last command; zero where that jumped.
     course : Course
         How what the effects change went on from command to command.
+    motion : (n, 1)
+        Changes of extensions up to this are rounding.
+    before : (n, 1), (n, 1) or None
+        ``extension`` and ``plain`` of the command before the first; None where none is nearby.
     """
 
     wanted: Array
@@ -78,13 +80,33 @@ class Commands:
     history: History
     standing: Standpoint
     plain: Array
-    trend: Array
     course: Course
+    motion: Array
+    before: tuple[Array, Array] | None
 
     @property
     def poses(self) -> Poses:
         """Where the machine then stands, by its model."""
         return self.standing.poses
+
+    @cached_property
+    def trend(self) -> Array:
+        """How what is added to ``plain`` grew with it up to the last command, (n, 1).
+
+        Zero where that jumped.
+        """
+        if self.plain.shape[1] > 1:
+            last, begun = self.extension[:, -2:-1], self.plain[:, -2:-1]
+        elif self.before is not None:
+            last, begun = self.before
+        else:
+            return np.zeros_like(self.plain)
+        way = self.plain[:, -1:] - begun
+        grown = self.extension[:, -1:] - last - way
+        length = np.abs(way)
+        smooth = (length > self.motion) & (np.abs(grown) <= STEEPEST * length)
+        way[~smooth] = 1.0
+        return np.asarray(np.where(smooth, grown / way, 0.0))
 
     @cached_property
     def solved(self) -> BoolArray:
@@ -224,8 +246,7 @@ def _solved(
     begin = aim.closed.extension if before is None else aim.closed.extension - before.extension
     extension = np.where(kept, begin, history.extension[:, -1:])
     if identified.effects:
-        trend = None if after is None else after.trend
-        near, good, passes = _settled(told, aim, extension, before, kept, trend)
+        near, good, passes = _settled(told, aim, extension, before, kept, after)
     else:
         none = Changes(np.zeros_like(extension), None, None)
         near = aim.standing(extension, np.zeros(count), none)
@@ -238,9 +259,21 @@ def _solved(
         np.concatenate([history.extension, extension[:, solved]], axis=1),
         np.concatenate([history.time_s, told.time_s[solved]]),
     )
-    grown = _trend(identified, extension, plain.extension, after)
     course = Course.after(near.changes, None if after is None else after.course)
-    return Commands(goal, extension, q, passes, why, sent, near, plain.extension, grown, course)
+    last = None if after is None else (after.extension[:, -1:], after.plain[:, -1:])
+    return Commands(
+        wanted=goal,
+        extension=extension,
+        q=q,
+        passes=passes,
+        refused=why,
+        history=sent,
+        standing=near,
+        plain=plain.extension,
+        course=course,
+        motion=identified.motion[:, None],
+        before=last,
+    )
 
 
 def _foreseen(identified: Identified, plain: Configuration, after: Commands) -> Changes:
@@ -257,7 +290,7 @@ def _settled(
     extension: Array,
     before: Changes | None,
     kept: BoolArray,
-    trend: Array | None,
+    after: Commands | None,
 ) -> tuple[Standpoint, BoolArray, int]:
     """Ask effects and take what they say off, until they say the same; which did, passes taken."""
     identified = told.identified
@@ -277,25 +310,10 @@ def _settled(
         step = aim.closed.extension - changes.extension - extension
         step = np.where(kept & np.isfinite(step), step, 0.0)
         before = changes
-        if trend is not None:  # what effects add grows with it as it did
-            before = changes.growing(-trend * step)
-            step = (1.0 + trend) * step
+        if after is not None:  # what effects add grows with it as it did
+            before = changes.growing(-after.trend * step)
+            step = (1.0 + after.trend) * step
         extension = extension + step
-
-
-def _trend(identified: Identified, extension: Array, plain: Array, after: Commands | None) -> Array:
-    """:attr:`Commands.trend` by the last two commands, those before included."""
-    last, begun = (extension[:, -2:-1], plain[:, -2:-1])
-    if plain.shape[1] == 1:
-        if after is None:
-            return np.zeros_like(plain)
-        last, begun = after.extension[:, -1:], after.plain[:, -1:]
-    way = plain[:, -1:] - begun
-    grown = extension[:, -1:] - last - way
-    length = np.abs(way)
-    smooth = (length > identified.motion[:, None]) & (np.abs(grown) <= STEEPEST * length)
-    way[~smooth] = 1.0
-    return np.asarray(np.where(smooth, grown / way, 0.0))
 
 
 def _why(
