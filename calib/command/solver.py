@@ -27,7 +27,7 @@ from calib.command.surroundings import Surroundings
 from calib.command.told import Told
 from calib.errors import BadInput
 from calib.mechanism.configuration import Configuration
-from calib.mechanism.limits import violations
+from calib.mechanism.limits import passes_none, violations
 from calib.mechanism.rigid import Poses
 from calib.mechanism.solve import begun_at, forward, home_configuration, inverse
 from calib.mechanism.task import task_values
@@ -168,9 +168,9 @@ def commands_for(
     plain = inverse(machine, goal, identified.parameters, start)
     if after is not None and not plain.converged.all():
         plain = inverse(machine, goal, identified.parameters)
-    refused = _by_geometry(plain)
-    reachable = goal
+    refused, reachable = ("",) * goal.shape[1], goal
     if not plain.converged.all():  # the others are solved beside a pose that can be
+        refused = tuple("" if good else UNREACHABLE for good in plain.converged)
         home = task_values(machine.task, home_configuration(machine).poses)
         reachable = np.where(plain.converged, goal, home)
         plain = inverse(machine, reachable, identified.parameters)
@@ -181,9 +181,9 @@ def commands_for(
         if attempt.refused == refused:
             break
         refused = attempt.refused
-    attempt = replace(attempt, wanted=goal)
-    if alternatives:
-        return replace(attempt, history=history)
+    if reachable is not goal or alternatives:
+        kept = history if alternatives else attempt.history
+        return replace(attempt, wanted=goal, history=kept)
     return attempt
 
 
@@ -212,10 +212,6 @@ def _check(coordinates: tuple[str, ...], goal: Array) -> None:
     if not np.isfinite(goal).all():
         pose = int(np.argmax(~np.isfinite(goal).all(axis=0)))
         raise BadInput(f"pose {pose + 1} is not finite", remedy="Give numbers in mm and rad")
-
-
-def _by_geometry(plain: Configuration) -> tuple[str, ...]:
-    return tuple("" if good else UNREACHABLE for good in plain.converged)
 
 
 def _steps(refused: tuple[str, ...], alternatives: bool) -> IntArray:
@@ -334,6 +330,8 @@ def _why(
             why[stuck[0] + 1 :] = [why[row] if refused[row] else BEHIND for row in after]
         return tuple(why)
     machine, controller = identified.machine, identified.controller
+    if passes_none(machine, near.extension + identified.reference, near.closed):
+        return tuple(why)
     commanded = replace(near.closed, extension=near.extension)
     for one in violations(machine, commanded, controller):
         if not why[one.pose]:

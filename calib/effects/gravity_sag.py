@@ -9,6 +9,8 @@ platform gives way by the compliance of the elastic closure itself: rods are spr
 compliances of the closure are in the file's proportion to them.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from calib.arrays import Array, BoolArray
@@ -83,6 +85,7 @@ def under_load(rows: Rows) -> BoolArray:
     return np.asarray(stated[rows.run])
 
 
+@lru_cache(maxsize=64)
 def spring_compliance(machine: Machine) -> float:
     """Compliance of the rods that are springs in the machine file, mm/N; 0 without any."""
     named = [

@@ -4,6 +4,8 @@ For chains whose joints are all driven, with the masses that their file states (
 nominal geometry, as a weight needs no better.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from calib.arrays import Array
@@ -13,6 +15,7 @@ from calib.mechanism.rigid import cross, rotate
 from calib.runs.stack import Rows
 
 
+@lru_cache(maxsize=64)
 def link_mass_kg(machine: Machine) -> float:
     """Mass of all links that have one, kg."""
     return sum(mass.kg for limb in machine.limbs for mass in limb.traits.masses)

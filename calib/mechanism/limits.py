@@ -56,6 +56,13 @@ def within_limits(
     return inside
 
 
+def passes_none(machine: Machine, q: Array, configuration: Configuration) -> bool:
+    """Whether all of it is within limits, commanded to coordinates q (n, N)."""
+    values = np.concatenate([q, configuration.passive])
+    low, high = machine.limits
+    return bool(((values >= low) & (values <= high)).all())
+
+
 def violations(
     machine: Machine,
     configuration: Configuration,
@@ -67,11 +74,8 @@ def violations(
     The limits are those that ``margin`` leaves.
     """
     q = machine.coordinates(configuration.extension, controller)
-    if margin is None and configuration.converged.all():
-        values = np.concatenate([q, configuration.passive])
-        low, high = machine.limits
-        if ((values >= low) & (values <= high)).all():
-            return []
+    if margin is None and configuration.converged.all() and passes_none(machine, q, configuration):
+        return []
     found = [
         Violation(int(i), "the pose cannot be reached: the limbs do not close", np.nan, 0, 0, "")
         for i in np.flatnonzero(~configuration.converged)
