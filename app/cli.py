@@ -1,6 +1,7 @@
 """The command line: one verb for each of the operator's tasks, loaded only when it is asked for."""
 
 import io
+import os
 import sys
 from difflib import get_close_matches
 from importlib import import_module
@@ -83,12 +84,29 @@ def _manual(context: click.Context, option: click.Parameter, wanted: bool) -> No
         context.exit()
 
 
+def _version(context: click.Context, option: click.Parameter, wanted: bool) -> None:
+    """Print the version, and by what kinematics are computed, and end."""
+    if wanted:
+        version = import_module("importlib.metadata").version("pkmcal")
+        kernel: Any = import_module("calib.mechanism.kernel")
+        by = f"the compiled core, for {kernel.processor()}"
+        if not kernel.available():
+            off = os.environ.get("PKMCAL_COMPILED") == "off"
+            why = "PKMCAL_COMPILED=off" if off else "the core was not built here (docs/speed.md)"
+            by = f"numpy, slower: {why}"
+        click.echo(f"pkmcal, version {version}\nkinematics by {by}")
+        context.exit()
+
+
 @click.command(
     cls=Verbs,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
-@click.version_option(package_name="pkmcal")
+@click.option(
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_version,
+    help="Show the version, and by what kinematics are computed, and exit.",
+)  # fmt: skip
 @click.option(
     "--man", is_flag=True, is_eager=True, expose_value=False, callback=_manual,
     help="Print the manual page, for man(1), and exit.",

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from app.files.models import chosen_effects
-from app.files.runs import HEADER, LoadedRun, read_run
-from app.jobs.chosen_runs import File, Runs, names_of, path_of
+from app.jobs.chosen_runs import File, Runs, path_of
+from app.jobs.fleet_folders import places_of
 from app.jobs.fleet_machine import Asked, Found, digest_of, fit_machine, keep, kept
 from app.jobs.record import Record, Report
 from app.spread import spread
@@ -118,8 +118,8 @@ def fit_fleet(
     Raises
     ------
     BadInput
-        For machines of two types, fewer than two that can be fitted, or a scheduler that does not
-        answer.
+        Where as many machines are of one type as of another, fewer than two can be fitted, or a
+        scheduler does not answer. What cannot be read, or is of another type than most, is told.
 
     Examples
     --------
@@ -127,41 +127,24 @@ def fit_fleet(
     >>> [(one.machine, one.what) for one in found.outliers]                  # doctest: +SKIP
     [('A17', 'leg3.L0')]
     """
-    runs = runs_of(folders)
-    machine = runs[0].machine
+    kept_in = path_of(out)
+    places, empty = places_of(folders, kept_in)
+    machine = next(one.run.machine for one in places if one.run is not None)
     effects = tuple(chosen_effects(machine, tuple(add), None))
-    names = _called([run.folder for run in runs])
+    names = _called([one.folder for one in places])
     asked = [
-        Asked(name, run, effects, digest_of(run, add))
-        for name, run in zip(names, runs, strict=True)
+        Asked(name, one.run, effects, digest_of(one.run, add))
+        for name, one in zip(names, places, strict=True)
+        if one.run is not None
     ]
-    found = _answers(asked, path_of(out), workers, scheduler, watch)
-    return FleetReport.of(_said(asked, found, [effect.id for effect in effects]))
-
-
-def runs_of(folders: Runs) -> list[LoadedRun]:
-    """The runs of a fleet, sorted by their folders; raises BadInput where types are mixed."""
-    places: dict[Path, None] = {}
-    for name in names_of(folders):
-        folder = Path(name)
-        if not folder.is_dir():
-            raise BadInput("no such folder", place=name, remedy="Name runs, or folders of runs")
-        below = sorted(one.parent for one in folder.glob(f"*/{HEADER}"))
-        here = [folder] if (folder / HEADER).is_file() else below
-        if not here:
-            raise BadInput("no run lies in it", place=name, remedy="Name runs, or folders of runs")
-        places |= dict.fromkeys(one.resolve() for one in here)
-    runs = [read_run(place) for place in places]
-    for other in runs[1:]:
-        if other.machine.parameters != runs[0].machine.parameters:
-            raise BadInput(
-                f"a {other.machine.name}, but {runs[0].folder} is of a {runs[0].machine.name}",
-                place=str(other.folder / HEADER),
-                remedy="Fit machines of one type together",
-            )
-    if len(runs) < 2:
-        raise BadInput("one machine is no fleet", remedy="Name the runs of two machines at least")
-    return runs
+    found = {one.name: one for one in _answers(asked, kept_in, workers, scheduler, watch)}
+    told = [
+        (one.folder, found.get(name, Found(name, failed=one.failed)))
+        for name, one in zip(names, places, strict=True)
+    ]
+    said = _said(machine.name, told, [effect.id for effect in effects])
+    said["remarks"] += [f"{folder}: no run lies in it" for folder in empty]
+    return FleetReport.of(said)
 
 
 def _called(folders: Sequence[Path]) -> list[str]:
@@ -198,8 +181,11 @@ def _answers(
     return [found[one.name] for one in asked]
 
 
-def _said(asked: Sequence[Asked], found: Sequence[Found], effects: Sequence[str]) -> dict[str, Any]:
-    """The answer as plain data."""
+def _said(
+    machine: str, told: Sequence[tuple[Path, Found]], effects: Sequence[str]
+) -> dict[str, Any]:
+    """The answer as plain data, of machines and the folders of their runs."""
+    found = [one for _, one in told]
     good = [one for one in found if not one.failed]
     if len(good) < 2:
         why = next(one.failed for one in found if one.failed)
@@ -225,7 +211,7 @@ def _said(asked: Sequence[Asked], found: Sequence[Found], effects: Sequence[str]
     numbers = {one.name: number for number, one in enumerate(good)}
     return {
         "format": FleetReport.FORMAT,
-        "machine": asked[0].run.machine.name,
+        "machine": machine,
         "effects": effects,
         "parameters": [
             {
@@ -236,14 +222,14 @@ def _said(asked: Sequence[Asked], found: Sequence[Found], effects: Sequence[str]
         ],
         "machines": [
             {
-                "name": one.name, "run": str(question.run.folder), "failed": one.failed,
+                "name": one.name, "run": str(folder), "failed": one.failed,
                 "readings": one.readings, "excluded": one.excluded, "rms_um": one.rms_um,
                 "noise_floor_um": one.noise_floor_um, "holdout_rms_um": one.holdout_rms_um,
                 "chi2_per_dof": one.chi2 / one.dof if one.dof > 0 else None,
                 "outlier": one.name in named,
                 **_values(one, shared, fleet, numbers.get(one.name)),
             }
-            for question, one in zip(asked, found, strict=True)
+            for folder, one in told
         ],
         "outliers": outliers,
         "remarks": _remarks(found, good),
@@ -276,7 +262,7 @@ def _outliers(
 
 
 def _remarks(found: Sequence[Found], good: Sequence[Found]) -> list[str]:
-    remarks = [f"{one.name} could not be fitted: {one.failed}" for one in found if one.failed]
+    remarks = [f"{one.name} is left out: {one.failed}" for one in found if one.failed]
     if len(good) < FEWEST:
         remarks.append(f"With fewer than {FEWEST} machines none can be called an outlier.")
     return remarks

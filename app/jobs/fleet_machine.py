@@ -115,15 +115,15 @@ def keep(folder: Path, found: Found, digest: str) -> None:
 def kept(folder: Path, name: str, digest: str) -> Found | None:
     """The answer of an earlier call to the same question; None where there is none."""
     try:
-        said: dict[str, Any] = json.loads(_file(folder, name).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        said: dict[str, Any] = dict(json.loads(_file(folder, name).read_text(encoding="utf-8")))
+        if said.pop("format") != STORED or said.pop("digest") != digest:
+            return None
+        for key in ("values", "covariance", "centre", "prior"):
+            said[key] = np.array(said[key], dtype=np.float64)
+        told: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in said.items()}
+        return Found(**told)
+    except (OSError, ValueError, TypeError, KeyError):  # cut short, or not ours
         return None
-    if said.pop("format", "") != STORED or said.pop("digest", "") != digest:
-        return None
-    for key in ("values", "covariance", "centre", "prior"):
-        said[key] = np.array(said[key], dtype=np.float64)
-    told: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in said.items()}
-    return Found(**told)
 
 
 def _file(folder: Path, name: str) -> Path:

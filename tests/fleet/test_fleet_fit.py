@@ -1,6 +1,7 @@
 """A fleet from its folders to its answer: the same again, gone on with, bad machines named."""
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -45,8 +46,31 @@ def test_a_machine_that_cannot_be_fitted_holds_up_no_other(made: Path, tmp_path:
     (bad / "points.csv").write_text("\n".join(table[:4]) + "\n", "utf-8")
     found = pkmcal.fit_fleet([made / "m0", made / "m1", bad], workers=1)
     assert [bool(one.failed) for one in found.machines] == [False, False, True]
-    assert any(remark.startswith("bad could not be fitted") for remark in found.remarks)
+    assert any(remark.startswith("bad is left out") for remark in found.remarks)
     assert found.outliers == ()
+
+
+def test_strays_in_the_folder_are_left_out_by_name(made: Path, tmp_path: Path) -> None:
+    for name in ("m0", "m1"):
+        shutil.copytree(made / name, tmp_path / "hall" / name)
+    pkmcal.simulate("hexapod", tmp_path / "hall" / "h1", poses=3)
+    (tmp_path / "hall" / "photos").mkdir()
+    (tmp_path / "hall" / "cut").mkdir()
+    shutil.copy(made / "m2" / "run.toml", tmp_path / "hall" / "cut")
+    table = (made / "m2" / "points.csv").read_text("utf-8")
+    (tmp_path / "hall" / "cut" / "points.csv").write_text(table[: len(table) // 2], "utf-8")
+    out = tmp_path / "hall" / "kept"
+    found = pkmcal.fit_fleet(tmp_path / "hall", out=out, workers=1)
+    assert [one.name for one in found.machines if not one.failed] == ["m0", "m1"]
+    remarks = " / ".join(found.remarks)
+    assert "h1 is left out: a hexapod, but" in remarks
+    assert "cut is left out: " in remarks
+    assert "truncated" in remarks
+    assert "photos: no run lies in it" in remarks
+    assert "kept" not in remarks
+    for number, text in enumerate(("[]", "{", '{"format": "pkm-fleet-machine/1"}')):
+        (out / "machines" / f"m{number % 2}.json").write_text(text, "utf-8")
+        assert pkmcal.fit_fleet(tmp_path / "hall", out=out, workers=1).to_json() == found.to_json()
 
 
 def test_what_is_no_fleet_is_said(made: Path, tmp_path: Path) -> None:
@@ -55,6 +79,6 @@ def test_what_is_no_fleet_is_said(made: Path, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="no run lies in it"):
         pkmcal.fit_fleet(tmp_path)
     pkmcal.simulate("hexapod", tmp_path / "other", poses=3)
-    with pytest.raises(BadInput, match="machines of one type"):
-        pkmcal.fit_fleet([made, tmp_path / "other"])
+    with pytest.raises(BadInput, match="as many of both"):
+        pkmcal.fit_fleet([made / "m0", tmp_path / "other"])
     assert run(["fleet", "fit", str(made), "--report", "page.txt"]) == 2

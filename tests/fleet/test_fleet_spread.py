@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pkmcal
-from app.jobs.fleet import runs_of
+from app.jobs.fleet_folders import places_of
 from app.jobs.fleet_machine import Asked, digest_of, fit_machine
 from app.spread import spread
 from calib.errors import BadInput
@@ -49,7 +49,8 @@ def test_a_scheduler_that_is_not_there_is_said(monkeypatch: pytest.MonkeyPatch) 
 def test_a_fleet_on_dask_is_that_of_processes_though_a_worker_is_killed(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed", reason="Dask is not installed")
     folder = make_fleet(tmp_path / "fleet", 8)
-    asked = [Asked(run.folder.name, run, (), digest_of(run, ())) for run in runs_of(folder)]
+    runs = [one.run for one in places_of(folder)[0]]
+    asked = [Asked(run.folder.name, run, (), digest_of(run, ())) for run in runs]
     here = [fit_machine(one) for one in asked]
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None
