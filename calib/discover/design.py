@@ -59,7 +59,8 @@ class FollowUpPlan:
         Channels that are to stand at a value (payload, temperature); empty: as they were.
     before, after : dict
         Probability to tell them apart if the key is true, with the readings there are, and with
-        the follow-up too. For a single effect: the power to see it.
+        the follow-up too. For a single effect: the power to see it. What the readings there are
+        have left open is not better known before than they leave it, whatever was to be expected.
     """
 
     poses: PoseSet
@@ -105,12 +106,13 @@ def design_follow_up(
     BadInput
         If an effect cannot be seen in these runs at all or is in the model already.
     """
-    sides = _sides(fit, effects, rng)
+    sides, surely = _sides(fit, effects, rng)
     machine = fit.model.machine
     poses = sample_poses(machine, candidates, rng, tolerance_margin(machine))
     offered = [_candidate(side, side.now) for side in sides]
     hidden = [side.signature for side in sides]
-    before = _chances(fit.problem, offered, hidden, rng)
+    expected = _chances(fit.problem, offered, hidden, rng)
+    before = {name: min(chance, surely) for name, chance in expected.items()}
     best: FollowUpPlan | None = None
     for condition in conditions or default_conditions(fit, effects):
         if watch is not None:
@@ -137,8 +139,13 @@ def default_conditions(fit: Fit, effects: Sequence[Effect]) -> list[dict[str, fl
     return found
 
 
-def _sides(fit: Fit, effects: Sequence[Effect], rng: np.random.Generator) -> list[Side]:
-    """Every effect with its size: as estimated where it is seen, else as large as is usual."""
+def _sides(
+    fit: Fit, effects: Sequence[Effect], rng: np.random.Generator
+) -> tuple[list[Side], float]:
+    """Every effect with its size: as estimated where it is seen, else as large as is usual.
+
+    And how surely the readings there are tell which of two it is.
+    """
     held = [effect.id for effect in fit.model.effects]
     rows = fit.model.rows
     for effect in effects:
@@ -154,10 +161,25 @@ def _sides(fit: Fit, effects: Sequence[Effect], rng: np.random.Generator) -> lis
     offered = effect_candidates(fit, problem, columns)
     found = diagnose(problem, offered, rng=rng, draws=99)
     findings = {finding.name: finding for finding in found.findings}
-    return [
+    sides = [
         _side(one, candidate, findings[candidate.name], own_to_each_run(one.effect, rows))
         for one, candidate in zip(columns, offered, strict=True)
     ]
+    return sides, told_apart(found.findings)
+
+
+def told_apart(findings: Sequence[Finding]) -> float:
+    """Probability that the likelier of two effects is the right one, by the readings themselves.
+
+    1 where they are no rivals: one is not seen. One half where the less likely explains as much,
+    each unknown charged with two of chi-square: what sizes are usual does not decide between them.
+    """
+    if len(findings) < 2 or any(one.p_value > NOT_SEEN for one in findings):
+        return 1.0
+    first, second = sorted(findings, key=lambda one: -one.log_evidence)
+    if second.chi2_fall - 2.0 * second.dof >= first.chi2_fall - 2.0 * first.dof:
+        return 0.5
+    return float(1.0 / (1.0 + np.exp(second.log_evidence - first.log_evidence)))
 
 
 def _side(one: EffectColumns, candidate: Candidate, found: Finding, own: bool) -> Side:

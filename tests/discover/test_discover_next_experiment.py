@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from app.analysis import load_refitter
 from app.files.machines import load_machine
 from app.files.poses import read_pose_file
 from app.verbs.design import command
-from calib.discover.design import design_follow_up
+from calib.discover.design import design_follow_up, told_apart
 from calib.discover.follow_up import FollowUp, own_to_each_run
 from calib.effects import effect_named
 from calib.errors import BadInput
@@ -66,6 +67,25 @@ def test_chosen_readings_beat_random_ones():
     assert len(set(chosen)) == 6
     random = [reached(rng.choice(60, 6, replace=False)) for _ in range(200)]
     assert reached(chosen) > max(random)
+
+
+@pytest.mark.parametrize(
+    ("evidences", "falls", "p_value", "surely"),
+    [
+        ((20.0, 20.0 - np.log(4.0)), (60.0, 50.0), 1e-9, 0.8),
+        ((50.0, 20.0), (120.0, 60.0), 1e-9, 1.0),
+        ((20.0, 12.0), (60.0, 61.0), 1e-9, 0.5),
+        ((20.0, 20.0), (60.0, 60.0), 0.4, 1.0),
+    ],
+)
+def test_readings_are_as_sure_as_they_are_of_two_that_they_show(evidences, falls, p_value, surely):
+    found = [
+        SimpleNamespace(log_evidence=evidence, chi2_fall=fall, dof=2, p_value=p_value)
+        for evidence, fall in zip(evidences, falls, strict=True)
+    ]
+    assert told_apart(found) == pytest.approx(surely, abs=1e-6)
+    assert told_apart(found[::-1]) == told_apart(found)
+    assert told_apart(found[:1]) == 1.0
 
 
 @pytest.fixture(scope="module")
