@@ -116,3 +116,12 @@ def estimates_of(unknowns: Sequence[Unknown], values: Array, sigmas: Array) -> t
         Estimate(unknown, float(value), float(sigma))
         for unknown, value, sigma in zip(unknowns, values, sigmas, strict=True)
     )
+
+
+def searched_in_words(unknowns: Iterable[Unknown], trial: Iterable[float]) -> str:
+    """Where the nonlinear unknowns stand, ``period = 2.68 rad, side = 1``; empty without any."""
+    searched = (unknown for unknown in unknowns if unknown.nonlinear)
+    return ", ".join(
+        f"{unknown.name.rpartition('.')[2]} = {value:.3g} {unknown.unit.replace('1', '')}".rstrip()
+        for unknown, value in zip(searched, trial, strict=False)
+    )

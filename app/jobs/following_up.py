@@ -142,9 +142,9 @@ def design(
         "seed": seed,
     }
     said = follow_up_report(plan, discriminate, begin, names)
-    if plan.certainty < SUFFICIENT:
-        way = np.concatenate([refit.rows.extension, machine.extension(plan.poses.q)], axis=1)
-        hard = {effect.id: effect.hard_to_see(machine, way) for effect in effects}
+    way = np.concatenate([refit.rows.extension, machine.extension(plan.poses.q)], axis=1)
+    hard = {effect.id: effect.hard_to_see(machine, way) for effect in effects}
+    if plan.certainty < SUFFICIENT or plan.at:
         said["advice"] += "".join(f" {name}: {why}." for name, why in hard.items() if why)
     return FollowUpReport.of(said, _plan=plan, _again=again)
 
@@ -176,7 +176,9 @@ def _advice(plan: FollowUpPlan, discriminate: tuple[str, str]) -> str:
     worst, now = plan.certainty, min(plan.before.values())
     what = f"{discriminate[0]} from {discriminate[1]}"
     if now >= 0.95:
-        return f"The runs there are already tell {what}: nothing need be measured for that."
+        where = " and ".join(f"{name} with {stands}" for name, stands in plan.at.items())
+        of = f" ({where}; elsewhere it may be harder to see)" if where else ""
+        return f"The runs there are already tell {what}{of}: nothing need be measured for that."
     if worst < SUFFICIENT:
         return (
             f"These poses would tell {what} with a probability of {worst:.0%} only: measure more "

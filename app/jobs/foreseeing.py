@@ -22,6 +22,7 @@ from calib.poses.reach import PoseSet, joined_poses, sample_poses
 from calib.poses.readings import NestReadings, Readings
 from calib.runs import Header
 from calib.runs.stack import Rows
+from calib.unknown import searched_in_words
 
 RESERVED = 3
 """Of so many poses one is there to show what the machine may hide."""
@@ -118,11 +119,7 @@ def _why(one: Sight, effect: Effect, rows: Rows) -> str:
     """Where an effect is hardly seen, and what the poses lack for it."""
     if one.least >= HARD:
         return ""
-    searched = [unknown for unknown in effect.unknowns(rows) if unknown.nonlinear]
-    at = ", ".join(
-        f"{unknown.name.rpartition('.')[2]} = {value:.3g} {unknown.unit.replace('1', '')}".rstrip()
-        for unknown, value in zip(searched, one.at, strict=True)
-    )
+    at = searched_in_words(effect.unknowns(rows), one.at)
     where = [f"{one.least:.2f} where {at}"] if at else []
     lacking = effect.hard_to_see(rows.machine, rows.extension)
     return "; ".join([*where, *([lacking] if lacking else [])])

@@ -6,7 +6,7 @@ then the decision itself is rehearsed on null draws of old and new readings toge
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -38,6 +38,7 @@ from calib.identify.fitting import Fit
 from calib.identify.signatures import EffectColumns, effect_columns
 from calib.poses.margin import tolerance_margin
 from calib.poses.reach import PoseSet, sample_poses
+from calib.unknown import searched_in_words
 
 DRAWS = 399
 NOT_SEEN = 0.05
@@ -61,12 +62,15 @@ class FollowUpPlan:
         Probability to tell them apart if the key is true, with the readings there are, and with
         the follow-up too. For a single effect: the power to see it. What the readings there are
         have left open is not better known before than they leave it, whatever was to be expected.
+    at : dict
+        Where what is searched of an effect that is not seen was taken to stand, in words.
     """
 
     poses: PoseSet
     conditions: dict[str, float]
     before: dict[str, float]
     after: dict[str, float]
+    at: dict[str, str] = field(default_factory=dict)
 
     @property
     def certainty(self) -> float:
@@ -121,7 +125,7 @@ def design_follow_up(
         if best is None or plan.certainty > best.certainty + 0.02:
             best = plan
     assert best is not None
-    return best
+    return replace(best, at={side.effect.id: side.stands for side in sides if side.stands})
 
 
 def default_conditions(fit: Fit, effects: Sequence[Effect]) -> list[dict[str, float]]:
@@ -185,9 +189,11 @@ def told_apart(findings: Sequence[Finding]) -> float:
 def _side(one: EffectColumns, candidate: Candidate, found: Finding, own: bool) -> Side:
     trial = one.trials.index(found.trial)
     amplitudes = np.array([estimate.value for estimate in found.estimates])
-    if found.p_value > NOT_SEEN:
-        amplitudes = candidate.sizes / np.sqrt(candidate.sizes.size)
-    return Side(one, candidate, trial, amplitudes, own)
+    if found.p_value <= NOT_SEEN:
+        return Side(one, candidate, trial, amplitudes, own)
+    amplitudes = candidate.sizes / np.sqrt(candidate.sizes.size)
+    stands = searched_in_words(one.unknowns, found.trial)
+    return Side(one, candidate, trial, amplitudes, own, stands)
 
 
 def _chances(

@@ -32,6 +32,8 @@ class Side:
         Size of its linear unknowns if it is the truth.
     own : bool
         Every run has its own unknowns of it (a drift).
+    stands : str
+        Where its nonlinear unknowns stand, in words, if the readings do not show it.
     """
 
     columns: EffectColumns
@@ -39,6 +41,7 @@ class Side:
     trial: int
     amplitudes: Array
     own: bool
+    stands: str = ""
 
     @property
     def effect(self) -> Effect:
