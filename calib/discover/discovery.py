@@ -57,7 +57,7 @@ class RunStage:
     def release(self) -> None:
         """Hold no columns nor null draws of what was asked: another stage needs the room."""
         if "run" in self.__dict__:
-            self.run.diagnosis.scores.release()
+            self.run.diagnosis.release()
 
     @property
     def doubtful(self) -> frozenset[str]:

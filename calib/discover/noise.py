@@ -39,6 +39,12 @@ def judge(fit: Fit, catalogue: Sequence[Effect], seed: int) -> RunDiagnosis:
     seed : int
         Of the null draws.
     """
+    answer = _judged(fit, catalogue, seed)
+    answer.diagnosis.rivals.told()  # while what it is made from is held
+    return answer
+
+
+def _judged(fit: Fit, catalogue: Sequence[Effect], seed: int) -> RunDiagnosis:
     white = diagnose_fit(fit, catalogue, np.random.default_rng(seed))
     if not _suspicious(white):
         return white
@@ -57,7 +63,7 @@ def judge(fit: Fit, catalogue: Sequence[Effect], seed: int) -> RunDiagnosis:
         if not found.components:
             return answer
         noisy = with_noise(fit, found.noise, found.components)
-        answer.diagnosis.scores.release()
+        answer.diagnosis.release()
         answer = diagnose_fit(noisy, catalogue, np.random.default_rng(seed))
         still = {one.name for one in answer.diagnosis.joined}
         left = tuple(one for one in kept if one.name in still)

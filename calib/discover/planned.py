@@ -97,7 +97,7 @@ def foreseen(fitted: Fit, effects: Sequence[Effect], rng: np.random.Generator) -
         worst = min(chances, key=lambda trial: chances[trial])
         mean, least = float(np.mean(list(chances.values()))), float(chances[worst])
         found.append(Sight(candidate.name, mean, least, candidate.trials[worst]))
-    scores.release()
+    answer.diagnosis.release()
     return tuple(sorted(found, key=lambda one: one.power))
 
 

@@ -13,7 +13,15 @@ from calib.arrays import Array
 from calib.evidence.bayes import observed
 from calib.evidence.candidate import Candidate
 from calib.evidence.family import ALPHA, significant
-from calib.evidence.findings import Dependence, Diagnosis, Finding, Joined, Unexplained
+from calib.evidence.findings import (
+    Dependence,
+    Diagnosis,
+    Finding,
+    Groups,
+    Joined,
+    Rivals,
+    Unexplained,
+)
 from calib.evidence.pairs import rivals
 from calib.evidence.problem import LinearProblem
 from calib.evidence.quadratic import Quadratic
@@ -90,10 +98,7 @@ def diagnose(
     return Diagnosis(
         findings=tuple(_finding(first, index, value) for index, value in first.evidences.items()),
         explained_by=tuple(scores.candidates[index].name for index, _ in chosen),
-        indistinguishable=tuple(
-            tuple(scores.candidates[index].name for index in group)
-            for group in _groups(found, alpha)
-        ),
+        rivals=Rivals(lambda: _groups(found, alpha)),
         unexplained=left,
         unknown_preferred=preferred,
         adequate=not chosen and not left.significant,
@@ -146,7 +151,7 @@ def _joining(scores: Scores, index: int) -> tuple[Array, Array]:
     return np.vstack([columns, high - low]), np.append(precision, 1e-2)
 
 
-def _groups(found: Exploration, alpha: float) -> list[tuple[int, ...]]:
+def _groups(found: Exploration, alpha: float) -> Groups:
     """For each chosen effect, itself first, those from which it cannot be told; none if alone."""
     groups: list[tuple[int, ...]] = []
     for judged, best in found.decided():
@@ -157,7 +162,8 @@ def _groups(found: Exploration, alpha: float) -> list[tuple[int, ...]]:
         others = [one for one in others if not _only_wider(judged.scores, best, one)]
         if others:
             groups.append((best, *others))
-    return groups
+    candidates = found.rounds[0].scores.candidates
+    return tuple(tuple(candidates[index].name for index in group) for group in groups)
 
 
 def _only_wider(scores: Scores, best: int, rival: int) -> bool:

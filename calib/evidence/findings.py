@@ -1,5 +1,6 @@
 """Records of a diagnosis: what was found of each candidate, and what none explains."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from calib.arrays import Array
@@ -94,6 +95,30 @@ class Joined:
     precision: Array
 
 
+Groups = tuple[tuple[str, ...], ...]
+
+
+class Rivals:
+    """What a run cannot tell apart: made once, when it is asked for, or never."""
+
+    def __init__(self, make: Callable[[], Groups]) -> None:
+        self._make: Callable[[], Groups] | None = make
+        self._told: Groups | None = None
+
+    def told(self) -> Groups:
+        """The answer; what it was made from is then let go."""
+        if self._told is None:
+            if self._make is None:
+                raise ValueError("what it would be made from has been let go")
+            self._told = self._make()
+        self._make = None
+        return self._told
+
+    def forget(self) -> None:
+        """Let go of what it would be made from."""
+        self._make = None
+
+
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """Answer to "what is missing?".
@@ -104,9 +129,8 @@ class Diagnosis:
         Every candidate, most evidence first.
     explained_by : tuple of str
         Candidates that one after the other were significant; empty if none.
-    indistinguishable : tuple of tuples of str
-        For each effect that was significant, itself first, those from which this run would tell
-        it with a probability below 0.8.
+    rivals : Rivals
+        Makes ``indistinguishable``, when that is asked for.
     unexplained : Unexplained
     unknown_preferred : bool
         The residual is explained better by structure of unknown origin than by any candidates.
@@ -125,7 +149,7 @@ class Diagnosis:
 
     findings: tuple[Finding, ...]
     explained_by: tuple[str, ...]
-    indistinguishable: tuple[tuple[str, ...], ...]
+    rivals: Rivals = field(repr=False)
     unexplained: Unexplained
     unknown_preferred: bool
     adequate: bool
@@ -135,6 +159,19 @@ class Diagnosis:
     joined: tuple[Joined, ...] = field(default=(), repr=False)
     structure: Joined | None = field(default=None, repr=False)
     quadratic_log_p: tuple[float, ...] = ()
+
+    @property
+    def indistinguishable(self) -> Groups:
+        """For each effect that was significant, itself first, what this run cannot tell it from.
+
+        Those from which it would tell it with a probability below 0.8.
+        """
+        return self.rivals.told()
+
+    def release(self) -> None:
+        """Hold no columns nor null draws: what was asked by now is known, and nothing more."""
+        self.rivals.forget()
+        self.scores.release()
 
     @property
     def best(self) -> Finding | None:
