@@ -1,6 +1,7 @@
 """The steps of the filter in C (calib/noise/core/filter.c); called by filtering.py.
 
-Arrays are C-contiguous, float64 but for ``reading`` (np.int64, -1 where a sequence has ended).
+Arrays are C-contiguous, float64 but for ``begun`` and ``reading`` (np.int64; -1 where a sequence
+has ended).
 ``ValueError`` where sizes do not go together, ``TypeError`` for another kind of array.
 """
 
@@ -32,5 +33,25 @@ def innovations(
     gain: Array,
     white: Array,
     rows: Array,
+    out: Array,
+) -> None: ...
+def products(
+    steps: int,
+    sequences: int,
+    states: int,
+    ties: int,
+    readings: int,
+    columns: int,
+    whitened: int,
+    variance: float,
+    share: float,
+    visit: float,
+    reading: IntArray,
+    begun: IntArray,
+    seen: Array,
+    rho: Array,
+    own: Array,
+    rows: Array,
+    spread: Array,
     out: Array,
 ) -> None: ...

@@ -19,9 +19,9 @@ from calib.mechanism import kernel
 try:
     from calib.noise import _filter
 except ImportError:
-    _built = False
+    _version = 0
 else:
-    _built = _filter.VERSION == 1
+    _version = _filter.VERSION
 
 ROOM = 250_000
 """Numbers that the states of steps may hold: as many steps are taken at once as there is room for,
@@ -42,10 +42,13 @@ class Layout:
     seen: Array
     ended: IntArray = field(init=False)
     """``reading``, -1 where there is none."""
+    begun: IntArray = field(init=False)
+    """``new`` as numbers."""
 
     def __post_init__(self) -> None:
         ended = np.where(self.there, self.reading, -1).astype(np.int64)
         object.__setattr__(self, "ended", ended)
+        object.__setattr__(self, "begun", self.new.astype(np.int64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,20 +67,40 @@ class Filters:
 
 def compiled() -> bool:
     """Whether the steps are done in C."""
-    return _built and kernel.wanted()
+    return _version >= 1 and kernel.wanted()
 
 
-def filters(layout: Layout, fade: Array, fresh: Array, noise: Array) -> Filters:
-    """Run the covariances through all sequences.
+def in_one_pass() -> bool:
+    """Whether :func:`products` is there: in C that was built before it was written it is not."""
+    return _version >= 2 and kernel.wanted()
 
-    Parameters
-    ----------
-    layout : Layout
-    fade, fresh : (T, B, n)
-        What is left of each part of the state before a step, and the variance that it gains.
-    noise : (T, B)
-        Variance R of each component of a reading; 1 where there is none.
+
+@dataclass(frozen=True, eq=False)
+class Sizes:
+    """Sizes of a noise as the filter takes them.
+
+    ``rho`` (A,) is what is left of what goes on in time, from the reading before, or None;
+    ``variance`` of a reading, ``share`` the part of it that goes on, ``visit`` the variance of a
+    visit.
     """
+
+    rho: Array | None
+    variance: float
+    share: float
+    visit: float
+
+
+def filters(layout: Layout, sizes: Sizes) -> Filters:
+    """Run the covariances of a noise through all sequences."""
+    fade = np.ones((*layout.there.shape, layout.seen.shape[3]))
+    fresh = np.zeros_like(fade)
+    first = 0 if sizes.rho is None else 3
+    if sizes.rho is not None:
+        fade[..., :first] = sizes.rho[layout.reading][..., None]
+        fresh[..., :first] = sizes.share * sizes.variance * (1.0 - fade[..., :first] ** 2)
+    fade[..., first:][layout.new] = 0.0
+    fresh[..., first:][layout.new] = sizes.visit
+    noise = np.where(layout.there, (1.0 - sizes.share) * sizes.variance, 1.0)
     steps, batch, _, size = layout.seen.shape
     gain = np.empty((steps, batch, size, 3))
     if compiled():
@@ -104,6 +127,35 @@ def filters(layout: Layout, fade: Array, fresh: Array, noise: Array) -> Filters:
     factor = np.linalg.cholesky(total)
     spread = np.diagonal(factor, axis1=-2, axis2=-1)
     return Filters(fade, gain, np.linalg.inv(factor), spread)
+
+
+def products(layout: Layout, sizes: Sizes, own: Array | None, rows: Array) -> tuple[Array, Array]:
+    """What was not predicted of k columns, white, times one another; in one pass, in C alone.
+
+    Parameters
+    ----------
+    layout : Layout
+    sizes : Sizes
+    own : (A, 3, 3), optional
+        Lower triangular matrices that whiten each reading first.
+    rows : (A, 3, k)
+
+    Returns
+    -------
+    products : (k, k)
+    spread : (T, B, 3)
+        As of :class:`Filters`.
+    """
+    steps, batch, _, size = layout.seen.shape
+    none = np.empty(0)
+    spread, out = np.ones((steps, batch, 3)), np.empty((rows.shape[2], rows.shape[2]))
+    _filter.products(
+        steps, batch, size, 0 if sizes.rho is None else 3, rows.shape[0], rows.shape[2],
+        int(own is not None), sizes.variance, sizes.share, sizes.visit, layout.ended,
+        layout.begun, layout.seen, none if sizes.rho is None else sizes.rho,
+        none if own is None else own, rows, spread, out,
+    )  # fmt: skip
+    return out, spread
 
 
 def innovations(layout: Layout, found: Filters, rows: Array) -> Array:

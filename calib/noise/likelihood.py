@@ -86,13 +86,13 @@ class Likelihood:
         """-log L with some noise."""
         whitening = Whitening(self.taking, noise)
         if noise.stretched:
-            products = self._products / noise.scale**2
+            products, log_det = self._products / noise.scale**2, whitening.log_det
         else:
-            products = _products(whitening.by_reading(self._rows))
+            products, log_det = whitening.products(self._rows)
         normal, step = self._step(products)
         log_normal = 2.0 * float(np.sum(np.log(np.diag(normal.factor)) - np.log(normal.scale)))
         square = float(products[-1, -1]) - float(step @ step)
-        return 0.5 * (whitening.log_det + log_normal + square)
+        return 0.5 * (log_det + log_normal + square)
 
     def left(self, noise: Noise) -> tuple[Array, Array]:
         """Residuals (3, A) of the fit with some noise, made white, and its G (p, 3, A)."""

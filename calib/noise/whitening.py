@@ -14,13 +14,21 @@ steps themselves are in :mod:`calib.noise.filtering`.
 """
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from calib.arrays import Array, BoolArray, IntArray
 from calib.noise.component import Noise, Taking
-from calib.noise.filtering import Filters, Layout, filters, innovations
+from calib.noise.filtering import (
+    Filters,
+    Layout,
+    Sizes,
+    filters,
+    in_one_pass,
+    innovations,
+    products,
+)
 
 ABREAST = 64
 """Columns that are filtered together: memory is that of so many, whatever their number."""
@@ -38,38 +46,29 @@ class Whitening:
     """
 
     def __init__(self, taking: Taking, noise: Noise) -> None:
-        self._count = taking.run.size
-        self._noise = noise
-        self._own: Array | None = None
-        roots, own_log_det = None, 0.0
-        if noise.scatter:
-            roots = root, self._own = taking.scatter.roots(noise.scatter, taking.live)
-            own_log_det = 2.0 * float(np.sum(np.log(np.diagonal(root, axis1=1, axis2=2))))
+        self._taking, self._noise = taking, noise
+        self._roots = taking.scatter.roots(noise.scatter, taking.live) if noise.scatter else None
         self._plain = noise.tau_s <= 0.0 and noise.visit <= 0.0
-        self._layout: Layout | None = None
-        self._chain: tuple[IntArray, Array] | None = None
+        self._chained = not self._plain and noise.visit <= 0.0 and noise.share >= 1.0
+
+    @cached_property
+    def log_det(self) -> float:
+        """log det C, of the components that are held."""
         if self._plain:
-            self.log_det = 2.0 * float(taking.held().sum()) * float(np.log(noise.scale))
-        elif noise.visit <= 0.0 and noise.share >= 1.0:
-            rho = np.exp(-taking.gaps(noise.by_row) / noise.tau_s)
-            left = np.sqrt(1.0 - rho**2)
-            self._chain = (taking.order, rho)
-            held = taking.held()[taking.order]
-            self.log_det = 2.0 * float(held @ np.log(noise.scale * left))
-        else:
-            layout = _laid_out(taking, noise.tau_s > 0.0, noise.visit > 0.0)
-            self._layout, self._filters = _filtering(taking, layout, noise, roots)
-            logs = np.log(self._filters.spread[layout.there])
-            if taking.live is not None:
-                logs = logs * taking.live[:, layout.reading[layout.there]].T
-            self.log_det = 2.0 * float(np.sum(logs))
-        self.log_det += own_log_det
+            return self._log_own + 2.0 * float(
+                self._taking.held().sum() * np.log(self._noise.scale)
+            )
+        if self._chained:
+            held = self._taking.held()[self._taking.order]
+            left = np.sqrt(1.0 - self._rho**2)
+            return self._log_own + 2.0 * float(held @ np.log(self._noise.scale * left))
+        return self._log_of(self._filter[1].spread)
 
     def apply(self, columns: Array) -> Array:
         """Columns (..., 3, A) of whitened components, made white; each stays in its place."""
-        if self._plain and self._own is None:
+        if self._plain and self._roots is None:
             return columns / self._noise.scale if self._noise.scale != 1.0 else columns
-        flat = columns.reshape(-1, 3, self._count)
+        flat = columns.reshape(-1, *columns.shape[-2:])
         out = np.empty_like(flat)
         for first in range(0, flat.shape[0], ABREAST):
             part = slice(first, first + ABREAST)
@@ -79,14 +78,13 @@ class Whitening:
 
     def by_reading(self, rows: Array) -> Array:
         """The same of columns that lie reading by reading, (A, 3, k)."""
-        if self._layout is not None:
-            return innovations(self._layout, self._filters, rows)
-        if self._own is not None:
-            rows = _times(self._own, rows)
+        if not (self._plain or self._chained):
+            return innovations(*self._filter, rows)
+        if self._roots is not None:
+            rows = _times(self._roots[1], rows)
         if self._plain:
             return rows / self._noise.scale if self._noise.scale != 1.0 else rows
-        assert self._chain is not None
-        order, rho = self._chain
+        order, rho = self._taking.order, self._rho
         left = 1.0 / (self._noise.scale * np.sqrt(1.0 - rho**2))
         out = np.empty_like(rows)
         for first in range(0, order.size, TOGETHER):
@@ -96,6 +94,69 @@ class Whitening:
             before += left[part, None, None] * rows[order[part]]
             out[order[part]] = before
         return out
+
+    def products(self, rows: Array) -> tuple[Array, float]:
+        """Columns (A, 3, k), made white, times one another, (k, k), and log det C."""
+        if self._plain or self._chained or not in_one_pass():
+            flat = self.by_reading(rows).reshape(-1, rows.shape[2])
+            return flat.T @ flat, self.log_det
+        own = None if self._roots is None else self._roots[1]
+        found, spread = products(self._layout, self._sizes, own, rows)
+        return found, self._log_of(spread)
+
+    @cached_property
+    def _log_own(self) -> float:
+        """log det of the readings' own scatter."""
+        if self._roots is None:
+            return 0.0
+        return 2.0 * float(np.sum(np.log(np.diagonal(self._roots[0], axis1=1, axis2=2))))
+
+    def _log_of(self, spread: Array) -> float:
+        """log det C, of a filter's spread (T, B, 3)."""
+        layout, live = self._layout, self._taking.live
+        logs = np.log(spread[layout.there])
+        if live is not None:
+            logs = logs * live[:, layout.reading[layout.there]].T
+        return self._log_own + 2.0 * float(np.sum(logs))
+
+    @cached_property
+    def _rho(self) -> Array:
+        """What goes on from the reading before (A,), in the order of time."""
+        return np.asarray(np.exp(-self._taking.gaps(self._noise.by_row) / self._noise.tau_s))
+
+    @property
+    def _layout(self) -> Layout:
+        return _laid_out(self._taking, self._noise.tau_s > 0.0, self._noise.visit > 0.0)
+
+    @property
+    def _sizes(self) -> Sizes:
+        noise, rho = self._noise, None
+        if noise.tau_s > 0.0:
+            rho = np.empty(self._taking.run.size)
+            rho[self._taking.order] = self._rho
+        share = 0.0 if rho is None else noise.share
+        return Sizes(rho, noise.scale**2, share, noise.visit**2)
+
+    @cached_property
+    def _filter(self) -> tuple[Layout, Filters]:
+        """The filter of all readings, those that are whitened by a root's inverse W first as well.
+
+        With y' = W y the innovation S^-1/2 (y' - H' x) is S^-1/2 W (y - W^-1 H' x): readings are
+        taken as they are, and only what the filter knows of each is changed.
+        """
+        layout, sizes = self._layout, self._sizes
+        if self._roots is None:
+            return layout, filters(layout, sizes)
+        first = 0 if sizes.rho is None else 3
+        root, own = (one[layout.reading] for one in self._roots)
+        seen, raw = layout.seen.copy(), layout.seen
+        seen[..., first:] = _times(own, layout.seen[..., first:])
+        found = filters(replace(layout, seen=seen), sizes)
+        if first:
+            raw = raw.copy()
+            raw[..., :first] = root * layout.there[..., None, None]
+        gain, white = _by(found.gain, own), _by(found.white, own)
+        return replace(layout, seen=raw), replace(found, gain=gain, white=white)
 
 
 def _times(lower: Array, rows: Array) -> Array:
@@ -148,47 +209,6 @@ def _moved(taking: Taking, reading: IntArray, there: BoolArray) -> Array:
     """How actuators that do not repeat move each reading of the sequences, (T, B, 3, n)."""
     motions = taking.motions.transpose(2, 1, 0)[reading]
     return np.asarray(motions * (there & (taking.visit[reading] >= 0))[..., None, None])
-
-
-def _filtering(
-    taking: Taking, layout: Layout, noise: Noise, roots: tuple[Array, Array] | None
-) -> tuple[Layout, Filters]:
-    """Filter of readings that the inverse W of a root (A, 3, 3 each) whitens first, if given.
-
-    With y' = W y the innovation S^-1/2 (y' - H' x) is S^-1/2 W (y - W^-1 H' x): readings are
-    taken as they are, and only what the filter knows of each is changed.
-    """
-    if roots is None:
-        return layout, _filters(taking, layout, noise)
-    first = 3 if noise.tau_s > 0.0 else 0
-    root, own = (one[layout.reading] for one in roots)
-    seen, raw = layout.seen.copy(), layout.seen
-    seen[..., first:] = _times(own, layout.seen[..., first:])
-    found = _filters(taking, replace(layout, seen=seen), noise)
-    if first:
-        raw = raw.copy()
-        raw[..., :first] = root * layout.there[..., None, None]
-    gain, white = _by(found.gain, own), _by(found.white, own)
-    return replace(layout, seen=raw), replace(found, gain=gain, white=white)
-
-
-def _filters(taking: Taking, layout: Layout, noise: Noise) -> Filters:
-    """Run the covariances of a noise through all sequences."""
-    ties = noise.tau_s > 0.0
-    steps, batch, _, size = layout.seen.shape
-    first = 3 if ties else 0
-    variance, correlated = noise.scale**2, noise.share if ties else 0.0
-    fade = np.ones((steps, batch, size))
-    fresh = np.zeros((steps, batch, size))
-    if ties:
-        rho = np.zeros(taking.run.size)
-        rho[taking.order] = np.exp(-taking.gaps(noise.by_row) / noise.tau_s)
-        fade[..., :first] = rho[layout.reading][..., None]
-        fresh[..., :first] = correlated * variance * (1.0 - fade[..., :first] ** 2)
-    fade[..., first:][layout.new] = 0.0
-    fresh[..., first:][layout.new] = noise.visit**2
-    own = np.where(layout.there, (1.0 - correlated) * variance, 1.0)
-    return filters(layout, fade, fresh, own)
 
 
 def _sequences(taking: Taking, order: IntArray, ties: bool) -> list[IntArray]:

@@ -1,11 +1,13 @@
 """Innovations are what a dense Cholesky factor of the covariance would make of the readings."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from calib.mechanism import kernel
-from calib.noise import Noise, Taking, Whitening
-from calib.noise.filtering import compiled
+from calib.noise import Noise, Scatter, Taking, Whitening
+from calib.noise.filtering import compiled, in_one_pass
 
 READINGS, ACTUATORS = 30, 4
 CASES = [
@@ -73,7 +75,29 @@ def test_the_compiled_filter_whitens_as_numpy_does(noise):
     assert whitening.log_det == pytest.approx(reference.log_det, abs=1e-11)
 
 
-@pytest.mark.skipif(not compiled(), reason="the filter was not compiled here")
+@pytest.mark.skipif(not in_one_pass(), reason="the filter was not compiled here")
+@pytest.mark.parametrize("columns", [1, 24, 61])
+@pytest.mark.parametrize("noise", CASES, ids=str)
+def test_products_in_one_pass_are_those_of_white_columns(noise, columns):
+    rng = np.random.default_rng(4)
+    taken, rows = taking(rng), rng.standard_normal((READINGS, 3, columns))
+    beam = rng.standard_normal((3, READINGS))
+    scatter = Scatter({"some": np.arange(READINGS) < 9}, beam / np.linalg.norm(beam, axis=0))
+    live = rng.uniform(size=(3, READINGS)) < 0.9
+    taken = replace(taken, scatter=scatter, live=live)
+    rows *= live.T[:, :, None]
+    for own in ((), (("some", 1.7), ("along", 0.6))):
+        whitening = Whitening(taken, replace(noise, scatter=own))
+        found, log_det = whitening.products(rows)
+        with kernel.reference():
+            expected, reference = Whitening(taken, replace(noise, scatter=own)).products(rows)
+        white = whitening.by_reading(rows).reshape(-1, columns)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11)
+        np.testing.assert_allclose(found, white.T @ white, rtol=0, atol=1e-11)
+        assert log_det == pytest.approx(reference, abs=1e-11)
+
+
+@pytest.mark.skipif(not in_one_pass(), reason="the filter was not compiled here")
 def test_arrays_that_do_not_go_together_are_refused():
     from calib.noise import _filter
 
@@ -87,6 +111,14 @@ def test_arrays_that_do_not_go_together_are_refused():
                             np.zeros(9), three, np.zeros(3))  # fmt: skip
     with pytest.raises(TypeError):
         _filter.gains(1, 1, 1, np.zeros(3, dtype=int), *[two] * 6)
+    sizes, none, one = (1, 1, 3, 0, 1, 1, 0), np.zeros(0), np.ones(1)
+    seen, rest = np.zeros(9), (none, none, three, np.zeros(3), one)
+    for reading, error in ((1, "no such reading"), (0, "numbers are given")):
+        with pytest.raises(ValueError, match=error):
+            _filter.products(*sizes, 1.0, 0.0, 0.0, np.array([reading]), np.zeros(1, dtype=int),
+                             seen if reading else two, *rest)  # fmt: skip
+    with pytest.raises(ValueError, match="go together"):
+        _filter.products(1, 1, 2, 3, 1, 1, 0, 1.0, 0.0, 0.0, *[two] * 8)
 
 
 def test_a_long_run_keeps_its_covariances():

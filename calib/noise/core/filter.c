@@ -9,9 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define MOST_BUFFERS 10
-#define BLOCK 64 /* columns that are carried along together: their states stay near the processor */
+#include "pass.h"
 
+#define MOST_BUFFERS 10
 typedef struct { Py_buffer view[MOST_BUFFERS]; int count; } Held;
 
 static void release(Held *held) {
@@ -51,60 +51,6 @@ static int sizes(PyObject *const *args, int count, Py_ssize_t least, Py_ssize_t 
     if (product < 1e12) return 1;
     PyErr_SetString(PyExc_ValueError, "so many numbers are too many");
     return 0;
-}
-
-/* S = L L^T: L^-1 and the diagonal of L. */
-static void inverted_root(const double *S, double *white, double *spread) {
-    const double a = sqrt(S[0]), b = S[3] / a, c = S[6] / a;
-    const double d = sqrt(S[4] - b * b), e = (S[7] - c * b) / d, f = sqrt(S[8] - c * c - e * e);
-    memset(white, 0, 9 * sizeof(double));
-    white[0] = 1.0 / a, white[4] = 1.0 / d, white[8] = 1.0 / f;
-    white[3] = -b * white[0] * white[4];
-    white[7] = -e * white[4] * white[8];
-    white[6] = -(c * white[0] + e * white[3]) * white[8];
-    spread[0] = a, spread[1] = d, spread[2] = f;
-}
-
-/* One step of the covariance P (n, n): faded, widened, and narrowed by a reading. */
-static void narrowed(Py_ssize_t n, const double *seen, const double *fade, const double *fresh,
-                     double noise, double *P, double *reach, double *gain, double *white,
-                     double *spread) {
-    for (Py_ssize_t i = 0; i < n; i++) {
-        for (Py_ssize_t j = 0; j < n; j++) P[i * n + j] *= fade[i] * fade[j];
-        P[i * n + i] += fresh[i];
-    }
-    double total[9];
-    for (Py_ssize_t i = 0; i < n; i++)
-        for (int r = 0; r < 3; r++) {
-            double sum = 0.0;
-            for (Py_ssize_t j = 0; j < n; j++) sum += P[i * n + j] * seen[r * n + j];
-            reach[i * 3 + r] = sum;
-        }
-    for (int r = 0; r < 3; r++)
-        for (int s = 0; s < 3; s++) {
-            double sum = r == s ? noise : 0.0;
-            for (Py_ssize_t i = 0; i < n; i++) sum += seen[r * n + i] * reach[i * 3 + s];
-            total[r * 3 + s] = sum;
-        }
-    inverted_root(total, white, spread);
-    for (Py_ssize_t i = 0; i < n; i++) {
-        double half[3];
-        for (int r = 0; r < 3; r++) {
-            half[r] = 0.0;
-            for (int s = 0; s <= r; s++) half[r] += white[r * 3 + s] * reach[i * 3 + s];
-        }
-        for (int r = 0; r < 3; r++) {
-            gain[i * 3 + r] = 0.0;
-            for (int s = r; s < 3; s++) gain[i * 3 + r] += white[s * 3 + r] * half[s];
-        }
-    }
-    for (Py_ssize_t i = 0; i < n; i++)
-        for (Py_ssize_t j = 0; j <= i; j++) {
-            double less = 0.0;
-            for (int r = 0; r < 3; r++)
-                less += 0.5 * (gain[i * 3 + r] * reach[j * 3 + r] + gain[j * 3 + r] * reach[i * 3 + r]);
-            P[j * n + i] = P[i * n + j] = P[i * n + j] - less;
-        }
 }
 
 static PyObject *gains(PyObject *self, PyObject *const *args, Py_ssize_t count) {
@@ -211,9 +157,63 @@ static PyObject *innovations(PyObject *self, PyObject *const *args, Py_ssize_t c
     Py_RETURN_NONE;
 }
 
+static PyObject *products(PyObject *self, PyObject *const *args, Py_ssize_t count) {
+    (void)self;
+    Py_ssize_t size[7];
+    Held held = {.count = 0};
+    if (count != 18)
+        return PyErr_Format(
+            PyExc_TypeError, "products(T, B, n, ties, A, k, W, 3 numbers, 6 arrays, 2 to fill)");
+    if (!sizes(args, 7, 0, size)) return NULL;
+    Pass p = {.T = size[0], .B = size[1], .n = size[2], .ties = size[3], .k = size[5]};
+    const Py_ssize_t A = size[4], W = size[6];
+    p.K = (p.k + ALONGSIDE - 1) / ALONGSIDE * ALONGSIDE;
+    p.variance = PyFloat_AsDouble(args[7]);
+    p.share = PyFloat_AsDouble(args[8]);
+    p.visit = PyFloat_AsDouble(args[9]);
+    if (PyErr_Occurred()) return NULL;
+    if (p.ties > p.n || W > 1) {
+        PyErr_SetString(PyExc_ValueError, "sizes do not go together");
+        return NULL;
+    }
+    const Py_ssize_t n = p.n, K = p.K;
+    double *out, *room = NULL;
+    int fine = (p.reading = items(&held, args[10], "lq", p.T * p.B, 0))
+        && (p.begun = items(&held, args[11], "lq", p.T * p.B, 0))
+        && (p.seen = items(&held, args[12], "d", p.T * p.B * 3 * n, 0))
+        && (p.rho = items(&held, args[13], "d", p.ties ? A : 0, 0))
+        && (p.own = items(&held, args[14], "d", W * A * 9, 0))
+        && (p.rows = items(&held, args[15], "d", A * 3 * p.k, 0))
+        && (p.spread = items(&held, args[16], "d", p.T * p.B * 3, 1))
+        && (out = items(&held, args[17], "d", p.k * p.k, 1));
+    for (Py_ssize_t at = 0; fine && at < p.T * p.B; at++)
+        if (p.reading[at] >= A) {
+            PyErr_SetString(PyExc_ValueError, "there is no such reading");
+            fine = 0;
+        }
+    const size_t wanted = (size_t)(n * n + n * K + 3 * READ * K + K * K + 11 * n + 3 * K + 1);
+    if (fine && !(room = calloc(wanted, sizeof(double)))) fine = !PyErr_NoMemory();
+    if (fine) {
+        if (!W) p.own = NULL;
+        p.P = room, p.x = p.P + n * n, p.block = p.x + n * K;
+        p.sums = p.block + 3 * READ * K;
+        Py_BEGIN_ALLOW_THREADS
+        gone_through(&p, p.sums + K * K);
+        for (Py_ssize_t i = 0; i < p.k; i++)
+            for (Py_ssize_t j = i; j < p.k; j++)
+                out[i * p.k + j] = out[j * p.k + i] = p.sums[i * K + j];
+        Py_END_ALLOW_THREADS
+    }
+    free(room);
+    release(&held);
+    if (!fine) return NULL;
+    Py_RETURN_NONE;
+}
+
 static PyMethodDef methods[] = {
     {"gains", (PyCFunction)(void (*)(void))gains, METH_FASTCALL, NULL},
     {"innovations", (PyCFunction)(void (*)(void))innovations, METH_FASTCALL, NULL},
+    {"products", (PyCFunction)(void (*)(void))products, METH_FASTCALL, NULL},
     {NULL, NULL, 0, NULL},
 };
 
@@ -227,7 +227,7 @@ PyMODINIT_FUNC PyInit__filter(void) {
         return NULL;
     }
     PyObject *module = PyModule_Create(&definition);
-    if (module && PyModule_AddIntConstant(module, "VERSION", 1)) {
+    if (module && PyModule_AddIntConstant(module, "VERSION", 2)) {
         Py_DECREF(module);
         return NULL;
     }
