@@ -8,6 +8,8 @@ from typing import Literal
 Kind = Literal["measure", "tell-apart", "warm-up", "apply", "verify", "stop"]
 Ground = Literal["first", "pair", "unknown", "warm", "accuracy", "write", "prove", "disagree", ""]
 """Which question a decision answers; what was declined is not asked again of the same readings."""
+SLOWEST, FASTEST = 0.5, 2.0
+"""Powers of the number of poses by which a prediction is taken to fall."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +61,9 @@ class Known:
         Measured for the fit, and spent in all.
     predicted_um : float
         RMS of the position error at fresh poses by the covariance of what was identified.
-    falls : float
-        How that falls with the poses, as poses ** -falls: a half, unless the last set with the
-        same effects has shown that it falls faster.
+    falls : float, optional
+        How that falls with the poses, as poses ** -falls, by the last set with the same effects.
+        Without one it is planned with a half, and nothing is given up for it.
     ambiguous : tuple of (str, str)
         Effects that the readings cannot tell apart: one that the model has, and its rival.
     hopeless : mapping of (str, str) to str
@@ -94,7 +96,7 @@ class Known:
     poses: int = 0
     minutes: float = 0.0
     predicted_um: float = math.inf
-    falls: float = 0.5
+    falls: float | None = None
     ambiguous: tuple[tuple[str, str], ...] = ()
     hopeless: Mapping[tuple[str, str], str] = field(default_factory=dict)
     unexplained: bool = False

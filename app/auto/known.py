@@ -4,12 +4,10 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from app.auto.decision import Known
+from app.auto.decision import FASTEST, SLOWEST, Known
 from app.auto.findings import Findings
 from app.auto.journal import Decisions
 
-SLOWEST, FASTEST = 0.5, 2.0
-"""Powers of the number of poses by which a prediction is taken to fall."""
 HOPELESS, REFUSED, VETOED, WAITED = "hopeless", "refused", "vetoed", "waited"
 """Keys of what came of a decision: a pair that stays in question, a gate's no, a person's no,
 time in which nothing was measured."""
@@ -66,20 +64,20 @@ def _since(journal: Decisions) -> list[dict[str, Any]]:
     return [line for line in journal.lines[last:] if line["event"] == "done"]
 
 
-def _falls(journal: Decisions, done: list[dict[str, Any]]) -> float:
+def _falls(journal: Decisions, done: list[dict[str, Any]]) -> float | None:
     """By which power of the poses the prediction fell when the last set with the same effects came.
 
-    Where one more unknown is all but free, as of what goes with time in a short run, it falls
-    faster than the root; never slower, as readings are independent.
+    None where no such set has come. Where one more unknown is all but free, as of what goes with
+    time in a short run, it falls faster than the root; never slower, as readings are independent.
     """
     poses = {line["run"]: int(line["poses"]) for line in done if "run" in line}
     seen = journal.of("found")[-2:]
     if len(seen) < 2 or set(seen[0]["effects"]) != set(seen[1]["effects"]):
-        return SLOWEST
+        return None
     few, many = (sum(poses[run] for run in line["runs"]) for line in seen)
     before, now = (float(line["predicted_um"]) for line in seen)
     if many <= few or not 0.0 < now < before < math.inf:
-        return SLOWEST
+        return None
     return min(max(math.log(before / now) / math.log(many / few), SLOWEST), FASTEST)
 
 

@@ -7,7 +7,7 @@ wanted (measure more), and nothing counts that fresh poses have not shown (verif
 
 import math
 
-from app.auto.decision import Decision, Ground, Known, Limits
+from app.auto.decision import FASTEST, SLOWEST, Decision, Ground, Known, Limits
 
 SURE = 0.8
 """A follow-up is worth its time if it gives the right answer with this probability."""
@@ -155,7 +155,8 @@ def _half_again(known: Known) -> int:
 def _more(known: Known, limits: Limits, affordable: int) -> Decision:
     """As many poses as bring the prediction below the target, by how it falls with them."""
     short = known.predicted_um / (SPARE * limits.target_um)
-    wanted = math.ceil(min(known.poses * (short ** (1.0 / known.falls) - 1.0), NEVER))
+    falls = SLOWEST if known.falls is None else known.falls
+    wanted = math.ceil(min(known.poses * (short ** (1.0 / falls) - 1.0), NEVER))
     if affordable < FEWEST:
         return _stop(
             f"{known.predicted_um:.1f} um are predicted, and the time left is not enough for more "
@@ -163,27 +164,31 @@ def _more(known: Known, limits: Limits, affordable: int) -> Decision:
             reached=False,
         )
     in_time = _in_time(known, limits)
-    then = _then(known, in_time)
-    if wanted > in_time and then > limits.target_um and not known.warmed:
+    seen = known.falls is not None
+    at_best = _then(known, in_time, falls if seen else FASTEST)
+    if wanted > in_time and at_best > limits.target_um and not known.warmed:
         return _stop(
             f"{known.predicted_um:.1f} um are predicted; the {in_time:.0f} poses for which there "
-            f"is time would bring {then:.1f} um, {limits.target_um:g} um are wanted",
+            f"is time would bring {at_best:.1f} um{'' if seen else ' at best'}, "
+            f"{limits.target_um:g} um are wanted",
             reached=False,
         )
-    most = max(FEWEST, known.poses) if known.warmed else MOST
+    # As many again as there are show how it falls.
+    doubled = known.warmed or (wanted > in_time and not seen)
+    most = max(FEWEST, known.poses) if doubled else MOST
     count = min(max(FEWEST, wanted), most, MOST, affordable)
     return Decision(
         "measure",
         f"{known.predicted_um:.1f} um are predicted, {limits.target_um:g} um are wanted",
         count,
-        expected={"at_most_um" if known.warmed else "predicted_um": _then(known, count)},
+        expected={"at_most_um" if known.warmed else "predicted_um": _then(known, count, falls)},
         ground="accuracy",
     )
 
 
-def _then(known: Known, count: float) -> float:
-    """What is predicted once there are so many poses more."""
-    return float(known.predicted_um * (known.poses / (known.poses + count)) ** known.falls)
+def _then(known: Known, count: float, falls: float) -> float:
+    """What is predicted once there are so many poses more, where it falls by that power."""
+    return float(known.predicted_um * (known.poses / (known.poses + count)) ** falls)
 
 
 def _prove(known: Known, limits: Limits, affordable: int) -> Decision:

@@ -18,7 +18,7 @@ knowns = st.builds(
     poses=st.integers(1, 200),
     minutes=st.floats(0.0, 600.0),
     predicted_um=UM,
-    falls=st.floats(0.5, 2.0),
+    falls=st.none() | st.floats(0.5, 2.0),
     ambiguous=st.lists(PAIRS, max_size=3).map(tuple),
     hopeless=st.dictionaries(PAIRS, st.just("no"), max_size=3),
     unexplained=st.booleans(),
@@ -57,12 +57,20 @@ def test_no_set_is_larger_than_the_time_left(known: Known, wanted: Limits) -> No
 
 def test_all_the_time_that_is_left_is_reckoned_with_not_one_set() -> None:
     wanted = Limits(8.0, minutes=360.0)
-    known = Known(poses=25, minutes=50.0, predicted_um=20.0)
+    known = Known(poses=25, minutes=50.0, predicted_um=20.0, falls=0.5)
     assert (decide(known, wanted).kind, decide(known, wanted).count) == ("measure", MOST)
-    hopeless = decide(replace(known, predicted_um=37.4), wanted)
+    hopeless = decide(replace(known, predicted_um=37.4, falls=0.5), wanted)
     assert hopeless.kind == "stop"
     assert "155 poses for which there is time would bring 13.9 um" in hopeless.why
     assert decide(replace(known, predicted_um=37.4, falls=1.5), wanted).kind == "measure"
+
+
+def test_nothing_is_given_up_by_a_fall_that_nobody_has_seen() -> None:
+    wanted = Limits(8.0, minutes=360.0)
+    known = Known(poses=25, minutes=50.0, predicted_um=37.4)
+    assert (decide(known, wanted).kind, decide(known, wanted).count) == ("measure", 25)
+    hopeless = decide(replace(known, predicted_um=800.0), wanted)
+    assert (hopeless.kind, "15.4 um at best" in hopeless.why) == ("stop", True)
 
 
 @given(knowns, limits)
@@ -164,7 +172,7 @@ def test_more_poses_are_as_many_as_the_prediction_needs() -> None:
 
 
 def test_it_stops_before_time_is_spent_that_cannot_be_enough() -> None:
-    known = Known(poses=20, minutes=40.0, predicted_um=40.0)
+    known = Known(poses=20, minutes=40.0, predicted_um=40.0, falls=0.5)
     decision = decide(known, Limits(8.0, minutes=80.0))
     assert (decision.kind, decision.reached) == ("stop", False)
     assert "the 20 poses for which there is time would bring 28.3 um" in decision.why
@@ -224,7 +232,7 @@ def test_what_is_not_sure_to_be_a_warm_up_is_looked_into_before_it_is_waited_for
 
 
 def test_a_warm_machine_is_not_reckoned_by_what_the_cold_one_has_shown() -> None:
-    known = Known(poses=15, minutes=90.0, waited=60.0, predicted_um=50.0, warmed=True)
+    known = Known(poses=15, minutes=90.0, waited=60.0, predicted_um=50.0, warmed=True, falls=0.5)
     assert decide(known, Limits(8.0)).count == 15
     assert decide(known, Limits(8.0)).expected.keys() == {"at_most_um"}
     assert decide(known, Limits(8.0, minutes=130.0)).count == 15
@@ -233,6 +241,6 @@ def test_a_warm_machine_is_not_reckoned_by_what_the_cold_one_has_shown() -> None
 
 
 def test_time_that_was_waited_is_not_the_time_of_a_pose() -> None:
-    known = Known(poses=20, minutes=100.0, waited=60.0, predicted_um=10.0)
+    known = Known(poses=20, minutes=100.0, waited=60.0, predicted_um=10.0, falls=0.5)
     assert decide(known, Limits(8.0, minutes=140.0)).count == 19
     assert decide(replace(known, waited=0.0), Limits(8.0, minutes=140.0)).kind == "stop"
