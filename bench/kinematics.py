@@ -17,11 +17,11 @@ import pinocchio as pin
 from app.files.machines import load_machine
 from bench._hexapod_closed_form import HexapodClosedForm, PoseFirst
 from calib.arrays import Array
-from calib.mechanism.closure import Standing, _twists, sweep
 from calib.mechanism.compiled import compile_machine
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.solve import Configuration, forward
+from calib.mechanism.sweep import Standing, sweep, twists_of
 from calib.poses import sample_poses
 
 POSES, REPEATS = 1000, 7
@@ -103,7 +103,7 @@ def open_limbs_ours(machine: Machine, configuration: Configuration) -> tuple[Arr
         if any(term.kind != "parameter" for term in element.terms)
     ]
     origin = state.position[:, None]
-    return point, _twists(group, screws, joints, origin, 1.0, np.dtype(float))
+    return point, twists_of(group, screws, joints, origin, 1.0, np.dtype(float))
 
 
 def main() -> None:

@@ -16,9 +16,10 @@ import numpy as np
 from calib.arrays import Array, BoolArray
 from calib.effects.component import Effect, Signature, Situation, alone
 from calib.effects.link_weight import link_forces, link_mass_kg
-from calib.mechanism.closure import Closure, Standing
+from calib.mechanism.closure import Closure
 from calib.mechanism.compiled import compile_machine
 from calib.mechanism.description import Machine
+from calib.mechanism.sweep import Standing
 from calib.runs.header import Load
 from calib.runs.stack import Rows
 from calib.unknown import Unknown

@@ -9,13 +9,14 @@ import numpy as np
 
 from calib.arrays import Array, Numbers
 from calib.errors import BadInput
-from calib.mechanism.closure import Closure, Standing, passive_twists
+from calib.mechanism.closure import Closure, passive_twists
 from calib.mechanism.compiled import compile_machine
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.rigid import Poses, from_euler, logarithm, product
 from calib.mechanism.solve import home_configuration, inverse, settle_limbs
 from calib.mechanism.survey import Survey, closure_at, survey, unit_rows
+from calib.mechanism.sweep import Standing
 from calib.mechanism.task import task_rows, task_values
 from calib.toml_place import line_of
 

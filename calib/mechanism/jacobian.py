@@ -11,12 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.arrays import Numbers
-from calib.mechanism.closure import Closure, Standing
+from calib.mechanism.closure import Closure
 from calib.mechanism.description import Kind, Machine
 from calib.mechanism.householder import Reflectors
 from calib.mechanism.kernel import kernel_of
 from calib.mechanism.newton import platform_solver
 from calib.mechanism.solve import CHUNK, Configuration
+from calib.mechanism.sweep import Standing
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,12 +6,13 @@ import numpy as np
 
 from calib.arrays import Array, BoolArray, IntArray, Numbers
 from calib.errors import BadInput
-from calib.mechanism.closure import Closure, Standing
+from calib.mechanism.closure import Closure
 from calib.mechanism.configuration import Configuration
 from calib.mechanism.description import Machine
 from calib.mechanism.householder import Reflectors, factorise
 from calib.mechanism.redundant import extension_steps
 from calib.mechanism.rigid import Poses, exponential, product
+from calib.mechanism.sweep import Standing
 from calib.mechanism.tables import actuator_units
 from calib.mechanism.task import task_error, task_rows
 

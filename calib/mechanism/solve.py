@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from calib.arrays import Array, Numbers
-from calib.mechanism.closure import Closure, Standing
+from calib.mechanism.closure import Closure
 from calib.mechanism.compiled import compile_machine
 from calib.mechanism.configuration import Configuration, joined
 from calib.mechanism.description import Machine
@@ -20,6 +20,7 @@ from calib.mechanism.kernel import Kernel, kernel_of
 from calib.mechanism.newton import MAX_STEP, Newton, run
 from calib.mechanism.rigid import Poses, from_euler
 from calib.mechanism.series import forward_numbers, inverse_numbers
+from calib.mechanism.sweep import Standing
 from calib.mechanism.task import FULL, task_values
 
 __all__ = [

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.arrays import Array, BoolArray, Numbers
-from calib.mechanism.closure import Closure, Standing, passive_twists
+from calib.mechanism.closure import Closure, passive_twists
 from calib.mechanism.configuration import joined
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.limits import within_limits
 from calib.mechanism.solve import Configuration, home_configuration, inverse
+from calib.mechanism.sweep import Standing
 from calib.mechanism.task import task_values
 
 POSES = 96

@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.arrays import Array
-from calib.mechanism.closure import Closure, LinearLimbs, Standing
+from calib.mechanism.closure import Closure, LinearLimbs
 from calib.mechanism.compiled import compile_machine
 from calib.mechanism.description import Machine
 from calib.mechanism.solve import Configuration
+from calib.mechanism.sweep import Standing
 
 
 @dataclass(frozen=True, eq=False)

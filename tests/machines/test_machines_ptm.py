@@ -9,12 +9,13 @@ import pytest
 
 from app.reproduce.pose_fit import fit_poses
 from calib.arrays import Array
-from calib.mechanism.closure import Closure, Standing
+from calib.mechanism.closure import Closure
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.parse import parse_machine
 from calib.mechanism.rigid import Poses, exponential, pose_difference, product, to_euler
 from calib.mechanism.solve import Configuration, forward, inverse
+from calib.mechanism.sweep import Standing
 from calib.mechanism.task import task_values
 from calib.mechanism.variants import with_closure
 

@@ -11,7 +11,7 @@ import pytest
 from calib.arrays import Array, BoolArray
 from calib.errors import BadInput
 from calib.mechanism import kernel
-from calib.mechanism.closure import Closure, Standing
+from calib.mechanism.closure import Closure
 from calib.mechanism.compiled import compile_machine
 from calib.mechanism.configuration import Configuration
 from calib.mechanism.description import Machine
@@ -20,6 +20,7 @@ from calib.mechanism.limits import violations
 from calib.mechanism.parse import parse_machine
 from calib.mechanism.rigid import Poses, exponential, pose_difference, product
 from calib.mechanism.solve import forward, inverse
+from calib.mechanism.sweep import Standing
 from calib.mechanism.task import task_values
 from calib.mechanism.variants import with_closure
 from tests.machines.made_machines import gantry, screw_delta

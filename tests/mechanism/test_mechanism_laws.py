@@ -5,12 +5,12 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from calib.mechanism.closure import Standing, sweep
 from calib.mechanism.compiled import compile_machine
 from calib.mechanism.description import Machine
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.rigid import Poses, cross, pose_difference, rotate
 from calib.mechanism.solve import Configuration, forward, home_configuration, inverse
+from calib.mechanism.sweep import Standing, sweep
 from calib.mechanism.task import task_values
 from tests.mechanism.conftest import load, manufactured, reachable
 
