@@ -6,7 +6,7 @@ import numpy as np
 
 from app.hosted.parameters import ParameterSet
 from calib.arrays import Array
-from calib.command import Commands, History, Identified, Surroundings, commands_for
+from calib.command import Commands, History, Identified, Surroundings, Trajectory, commands_for
 from calib.errors import BadInput
 from calib.mechanism.description import Machine
 from calib.runs.header import Load
@@ -106,6 +106,38 @@ class Commander:
         found: Array = commands.extension[:, 0]
         return found
 
+    def trajectory(
+        self, poses: Sequence[Sequence[float]], every_s: float, accelerations: Sequence[float]
+    ) -> tuple[Array, History]:
+        """Rows (N, n) of q for poses ``every_s`` apart, and what is then known of the way.
+
+        Lost motion is taken up as ``accelerations`` (n,) allow. Nothing is remembered.
+
+        Raises
+        ------
+        Refused
+            For what is no pose, or cannot be commanded, with its number.
+        """
+        self._check(poses)
+        if not poses:
+            raise Refused(
+                "no pose is no trajectory", device="host's computation", remedy="Give some"
+            )
+        identified, channels, self.left = self._in_these_conditions()
+        way = Trajectory(identified, self._history)
+        around = Surroundings(channels, self._clock())
+        try:
+            rows = way.rows(
+                np.array(poses, float).T, every_s, around, acceleration=np.array(accelerations)
+            )
+        except BadInput as error:
+            raise Refused(error.what, device="host's computation", remedy=error.remedy) from error
+        return rows, way.history
+
+    def played(self, history: History) -> None:
+        """Remember a trajectory that was accepted, as :meth:`trajectory` said."""
+        self._history = history
+
     def commands(self, poses: Sequence[Sequence[float]]) -> Commands:
         """Commands for poses one after the other; nothing is remembered.
 
@@ -114,14 +146,7 @@ class Commander:
         Refused
             For what is no pose.
         """
-        count = len(self._machine.task.coordinates)
-        for pose in poses:
-            if len(pose) != count or not np.all(np.isfinite(pose)):
-                raise Refused(
-                    f"{tuple(pose)} is no pose: {count} finite numbers are",
-                    device="host's computation",
-                    remedy="Command one",
-                )
+        self._check(poses)
         identified, channels, self.left = self._in_these_conditions()
         begins = self._clock() + self._travel_s
         times: Array = begins + (self._travel_s or BETWEEN_S) * np.arange(len(poses), dtype=float)
@@ -131,6 +156,16 @@ class Commander:
             return commands_for(identified, np.array(poses, float).T, around, history)
         except BadInput as error:
             raise Refused(error.what, device="host's computation", remedy=error.remedy) from error
+
+    def _check(self, poses: Sequence[Sequence[float]]) -> None:
+        count = len(self._machine.task.coordinates)
+        for pose in poses:
+            if len(pose) != count or not np.all(np.isfinite(pose)):
+                raise Refused(
+                    f"{tuple(pose)} is no pose: {count} finite numbers are",
+                    device="host's computation",
+                    remedy="Command one",
+                )
 
     def _in_these_conditions(self) -> tuple[Identified, dict[str, float], tuple[str, ...]]:
         """The machine, every channel that its effects need, and what nobody tells.

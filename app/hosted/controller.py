@@ -17,6 +17,7 @@ from calib.runs.header import Load
 from drivers.errors import ParameterError, Refused
 from drivers.interface import ActuatorState, Alarm, ControllerCan, ControllerState, StopsAtOnce
 from drivers.operator.motors import Ask, PersonMoves
+from drivers.playing import PlaysRows
 
 SHORT_OF_TARGET = 0.02
 """An actuator that rests farther from its target, mm or rad, did not come to it."""
@@ -148,6 +149,35 @@ class HostedController:
         if not self.by_hand:  # a person says on arrival where it was brought
             self._commander.sent(q)
         return q
+
+    async def play_poses(self, poses: Sequence[tuple[float, ...]], every_s: float) -> Array:
+        """Run through poses, one each ``every_s`` seconds, with the set in use.
+
+        The machine has been sent to the first of them before; :meth:`wait_arrived` waits for the
+        end. Returns rows (N, n) of q as they are sent.
+
+        Raises
+        ------
+        Refused
+            Before anything moves: for drives that cannot, a pose that cannot be commanded, and
+            what passes a limit, speed or acceleration.
+        """
+        device = self._means.device
+        if not isinstance(device, PlaysRows):
+            raise Refused(
+                "it cannot run through a trajectory",
+                device=self.identity.kind,
+                remedy='Bare drives can, with mode = "cyclic"; others are sent pose by pose',
+            )
+        _ = self.chosen
+        self._commander.stands_at(tuple(_stands(a) for a in (await self.state()).actuators))
+        rows, history = await asyncio.to_thread(
+            self._commander.trajectory, poses, every_s, device.accelerations
+        )
+        self._say_what_is_left()
+        await device.play_actuators(rows.tolist(), every_s)
+        self._commander.played(history)
+        return rows
 
     async def move_to_actuators(self, q: tuple[float, ...]) -> tuple[float, ...]:
         """Command actuator coordinates as they are; returns q as it was sent."""

@@ -20,6 +20,7 @@ from calib.arrays import Array, BoolArray, IntArray
 from calib.command.aiming import Aim
 from calib.command.changes import AGREED, Changes, changes_at, unrest
 from calib.command.course import Course
+from calib.command.easing import STEEPEST
 from calib.command.history import History
 from calib.command.identified import Identified
 from calib.command.standing import Standpoint
@@ -34,9 +35,6 @@ from calib.mechanism.task import task_values
 
 PATIENCE = 40
 """Passes without one more command of a sequence solved, after which the rest is given up."""
-
-STEEPEST = 0.1
-"""Growth of what effects add, per unit of way, beyond which it is a jump and no trend."""
 
 UNREACHABLE = "it cannot be reached: the limbs do not close"
 BEHIND = "it comes after a pose that does not converge"

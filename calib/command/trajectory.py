@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from calib.arrays import Array
+from calib.command.easing import eased
 from calib.command.history import History
 from calib.command.identified import Identified
 from calib.command.solver import Commands, commands_for
@@ -89,6 +90,40 @@ class Trajectory:
         BadInput
             For a pose that is refused, with its number; those before it have been given.
         """
+        for found in self._solved(wanted, period_s, surroundings):
+            yield found.q
+
+    def rows(
+        self,
+        wanted: Array,
+        period_s: float,
+        surroundings: Surroundings | None = None,
+        *,
+        acceleration: Array,
+    ) -> Array:
+        """All actuator coordinates q (N, n) at once, as drives can follow them.
+
+        As :meth:`blocks`, but lost motion is not taken up within a period: over so long that half
+        of ``acceleration`` (n,), mm/s^2 or rad/s^2, does (:mod:`calib.command.easing`).
+
+        Raises
+        ------
+        BadInput
+            As :meth:`blocks` does.
+        """
+        identified = self._identified
+        found = list(self._solved(wanted, period_s, surroundings))
+        extension, plain = (
+            np.concatenate([getattr(one, name) for one in found], axis=1)
+            for name in ("extension", "plain")
+        )
+        half = 0.5 * np.asarray(acceleration, dtype=np.float64)
+        easy = eased(extension, plain, period_s, half, identified.motion)
+        return np.ascontiguousarray((easy + identified.reference).T)
+
+    def _solved(
+        self, wanted: Array, period_s: float, surroundings: Surroundings | None
+    ) -> Iterator[Commands]:
         around = surroundings or Surroundings()
         begins = self._history.time_s[-1] if around.time_s is None else np.max(around.time_s)
         for first in range(0, wanted.shape[1], BLOCK):
@@ -101,4 +136,4 @@ class Trajectory:
                         f"pose {first + number + 1} of the trajectory: {why}",
                         remedy="Leave the pose out, or move it inward",
                     )
-            yield found.q
+            yield found

@@ -247,6 +247,11 @@ class DriveMotors:
                 raise
             self._travel = Travel(self._bus, self._stream, starts, counts, straight=stands)
 
+    @property
+    def accelerations(self) -> tuple[float, ...]:
+        """Largest acceleration of each actuator, mm/s^2 or rad/s^2."""
+        return tuple(axis.acceleration for axis in self._bus.axes)
+
     async def play_actuators(self, rows: Sequence[Sequence[float]], every_s: float) -> None:
         """Start along ``rows`` (N, A) of q, one each ``every_s`` seconds; mode ``cyclic`` only.
 

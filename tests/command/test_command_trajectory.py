@@ -96,3 +96,25 @@ def test_a_machine_without_effects_is_closed_at_its_commands_as_one_with_effects
         commands_for(bare, wanted, Surroundings({}, np.arange(wanted.shape[1])[::-1]))
     with pytest.raises(BadInput, match="payload_kg"):
         commands_for(bare, wanted, Surroundings({"payload_kg": np.nan}))
+
+
+def test_lost_motion_is_taken_up_as_drives_can_follow_it() -> None:
+    hard = 100.0  # mm/s^2
+    turn = np.linspace(0.0, 1.0, 2200)
+    angle = 2.0 * np.pi * turn**3 * (10.0 - 15.0 * turn + 6.0 * turn**2)  # at rest at both ends
+    zero = np.zeros(angle.size)
+    wanted = np.array([3 * np.sin(angle), 3 - 3 * np.cos(angle), 220 + zero, zero, zero, zero])
+    sharp = np.concatenate(list(Trajectory(identified()).blocks(wanted, PERIOD_S, HERE)), axis=1).T
+    easy = Trajectory(identified()).rows(wanted, PERIOD_S, HERE, acceleration=np.full(6, hard))
+
+    def hardest(q: np.ndarray) -> float:
+        return float(np.abs(np.diff(q, n=2, axis=0)).max() / PERIOD_S**2)
+
+    assert hardest(sharp) > 100 * hard
+    assert hardest(easy) < hard
+    assert np.abs(easy - sharp).max() <= 0.5 * LOST_MM + 1e-4
+    ramp = 2.0 * np.sqrt(LOST_MM / (0.5 * hard)) / PERIOD_S
+    turns = np.abs(np.diff(sharp, n=2, axis=0)).max(axis=1) / PERIOD_S**2 > 100 * hard
+    near = np.convolve(np.r_[False, turns, False], np.ones(2 * int(ramp) + 3), mode="same") > 0.5
+    np.testing.assert_allclose(easy[~near], sharp[~near], rtol=0.0, atol=1e-9)
+    assert np.mean(~near) > 0.3

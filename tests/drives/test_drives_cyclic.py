@@ -4,6 +4,7 @@ import asyncio
 import time
 from collections.abc import Callable
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,12 @@ import pytest
 from bare_lab import FAR, HOME, LOADED, SHORT, Bare
 from canopen.sdo.exceptions import SdoAbortedError
 
+from app.files.machines import load_machine
+from app.hosted.controller import HostedController
+from app.hosted.means import ByMotors
+from app.hosted.parameters import ParameterSet
+from app.hosted.store import HostStore
+from calib.mechanism.solve import forward
 from drivers.drives.motors import DriveMotors
 from drivers.errors import DeviceFault, DriveFault, Refused
 
@@ -182,6 +189,34 @@ async def test_a_trajectory_is_played_as_it_was_written(bare: Bare):
     sent = np.array(wire.rows)
     begun, told = (int(np.argmax((of != wanted[0]).any(axis=1))) for of in (sent, wanted))
     assert np.abs(sent[begun:][: len(wanted) - told] - wanted[told:]).max() <= 1
+
+
+@pytest.mark.long
+async def test_poses_are_played_with_what_the_host_compensates(bare: Bare, tmp_path: Path):
+    machine, store = load_machine("hexapod"), HostStore(tmp_path, load_machine("hexapod"))
+    lost = {f"backlash.{axis.name}": 0.02 for axis in machine.axes}
+    store.open()
+    store.save(ParameterSet({**ParameterSet.nominal(machine).values, **lost}))
+    motors = await cyclic(bare)
+    wire, host = Wire(motors), HostedController(machine, ByMotors(motors, machine), store)
+    turn = np.linspace(0.0, 1.0, 150)
+    angle = 2.0 * np.pi * turn**3 * (10.0 - 15.0 * turn + 6.0 * turn**2)
+    at = np.array(forward(machine, machine.extension(machine.home_q[:, None])).poses.to_xyz_rpy())
+    poses = [tuple(at[:, 0] + [0.5 * np.sin(a), 0.5 - 0.5 * np.cos(a), 0, 0, 0, 0]) for a in angle]
+    await host.move_to_pose(poses[0])
+    await host.wait_arrived(20.0)
+    rows = await host.play_poses(poses, 0.01)
+    await host.wait_arrived(20.0)
+    wire.must_be_smooth(motors)
+    assert rows.shape == (150, 6)
+    stands = [q + leg.position() for q, leg in zip(HOME, bare.world.legs, strict=True)]
+    assert stands == pytest.approx(tuple(rows[-1]), abs=1e-3)
+    with pytest.raises(Refused, match="pose 2 of the trajectory"):
+        await host.play_poses([poses[0], (900.0, *poses[0][1:])], 0.01)
+    for nothing, every_s in (([], 0.01), (poses, -0.01), (poses, float("nan"))):
+        with pytest.raises(Refused):
+            await host.play_poses(nothing, every_s)
+    await host.close()
 
 
 async def test_a_trajectory_that_cannot_be_played_moves_nothing(bare: Bare):
