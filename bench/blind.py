@@ -23,6 +23,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from app.files.machines import load_machine
+from app.jobs.posing import choose_poses
 from app.spread import spread
 from bench._blind_cases import SIGMA_MM, Case, build, draw_cases, draw_nulls
 from bench._blind_follow_up import follow_up, named
@@ -101,9 +102,19 @@ def designed(machine: str, number: int) -> np.ndarray:
     return np.asarray(chosen.pose_set.task.T)
 
 
+@lru_cache(maxsize=9)
+def for_discovery(machine: str, number: int) -> np.ndarray:
+    """29 poses of which a third is chosen to show effects, (29, k) in task coordinates."""
+    chosen = choose_poses(machine, n=29, purpose="discovery", seed=1 + number)
+    names = machine_named(machine).task.coordinates
+    return np.array([[pose.coordinates[name] for name in names] for pose in chosen.poses])
+
+
 def poses_of(case: Case) -> object:
     """Poses of a case: a designed set, or a number of random ones."""
     kind, number = case.poses.split()
+    if kind == "discovery":
+        return for_discovery(case.machine, case.seed % 3)
     return designed(case.machine, case.seed % 3) if kind == "designed" else int(number)
 
 

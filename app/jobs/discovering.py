@@ -193,6 +193,7 @@ class DiscoveryReport(Report):
     parameters: tuple[SizeEntry, ...]
     refused: tuple[str, ...]
     impossible: tuple[ImpossibleEntry, ...] = ()
+    not_on_this_machine: Mapping[str, str] = field(default_factory=dict)
     advice: str
     _found: Discovery = field(repr=False, compare=False)
     _runs: tuple[str, ...] = field(repr=False, compare=False)

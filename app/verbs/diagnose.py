@@ -90,9 +90,14 @@ def words(report: dict[str, Any]) -> str:
         lines += ["", f"Structure is left that no known effect explains; it depends on: {channels}"]
     lines += [*bad_lines(report), "", report["advice"]]
     lines += not_asked(report)
-    if lacking := report["not_on_this_machine"]:
-        lines.append(f"(not on this machine: {', '.join(lacking)}; pkmcal machine check says why)")
-    return "\n".join(lines)
+    return "\n".join([*lines, *not_there(report)])
+
+
+def not_there(report: dict[str, Any]) -> list[str]:
+    """Effects that the machine file does not make askable."""
+    lacking = ", ".join(report["not_on_this_machine"])
+    told = f"(not on this machine: {lacking}; pkmcal machine check says why)"
+    return [told] if lacking else []
 
 
 def um(value: float | None) -> str:

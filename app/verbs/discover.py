@@ -20,7 +20,7 @@ from app.analysis_options import (
     written_residuals,
 )
 from app.show.text_table import text_table
-from app.verbs.diagnose import bad_lines, not_asked, sizes, um
+from app.verbs.diagnose import bad_lines, not_asked, not_there, sizes, um
 
 
 @click.command()
@@ -117,7 +117,10 @@ def words(report: dict[str, Any]) -> str:
     if report["unexplained"]["significant"]:
         channels = ", ".join(report["unexplained"]["channels"])
         lines.append(f"Structure is left that no known effect explains; it depends on: {channels}")
-    return "\n".join([*lines, *bad_lines(report), "", report["advice"], *not_asked(report)])
+    lines += [*bad_lines(report), "", report["advice"], *not_asked(report)]
+    if report["unexplained"]["significant"]:
+        lines += not_there(report)  # what nobody asked may be what is missing
+    return "\n".join(lines)
 
 
 def _chance(step: dict[str, Any]) -> str:

@@ -75,6 +75,7 @@ def discovery_report(discovery: Discovery) -> dict[str, Any]:
         "parameters": effect_parameters(last.fit),
         "refused": [name for name in discovery.refused if name not in discovery.impossible],
         "unavailable": last.unavailable,
+        "not_on_this_machine": not_defined(last.fit.model.machine),
         "impossible": [impossible_entry(last, name) for name in discovery.impossible],
         "advice": advice(
             last, record, discovery.refused, likeness_of_found(discovery), discovery.impossible

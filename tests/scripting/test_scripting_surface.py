@@ -82,7 +82,7 @@ FIELDS = {
     "DiagnosisReport": "baseline adequate record candidates indistinguishable unexplained likeness "
     "hints noise bad_readings unavailable not_on_this_machine advice",
     "DiscoveryReport": "steps effects adequate record indistinguishable unexplained likeness hints "
-    "noise bad_readings unavailable parameters refused impossible advice",
+    "noise bad_readings unavailable parameters refused impossible not_on_this_machine advice",
     "FitReport": "effects readings chi2_per_dof log10_p p_value rms_um noise_floor_um "
     "holdout_rms_um holdout_floor_um platform_rms_um platform_floor_um by_kind "
     "parameters unidentified unidentified_words bad_readings left_out_readings channels_left_aside "
