@@ -107,7 +107,7 @@ class DiscoverFace(Face):
         self.query_one("#stairs", Static).update(stairs)
         self.query_one("#fails", Static).update(fails_text(view, self._shown, self.wide))
         self.query_one("#advice-text", Static).update(advice_text(view))
-        self.query_one("#found-text", Static).update(found_text(view))
+        self.query_one("#found-text", Static).update(found_text(search))
         self._fill(view)
         if view is not None:
             structure = view.comparison["structure"]
@@ -191,8 +191,8 @@ class DiscoverFace(Face):
             self.toggle_class("-model")
 
 
-NAME = 14
-"""Signs of a step's name, where none is longer."""
+NAME, LEGEND = 14, " ░noise █left"
+"""Signs of a step's name, where none is longer; what the bars beside it are."""
 
 
 def stairs_text(search: "Search | None", room: int, most: int) -> Content:
@@ -203,10 +203,10 @@ def stairs_text(search: "Search | None", room: int, most: int) -> Content:
         )
     shown = search.stairs[-most:]
     top = max(stair.rms_um for stair in search.stairs)
-    legend = " ░noise █left" if room > 10 else ""
     # A name is worth more than the bar beside it.
     more = min(max(0, *(len(stair.did) - NAME for stair in shown)), room)
     name, room = NAME + more, room - more
+    legend = LEGEND if room >= len(LEGEND) - 1 else ""
     head = f"{'RMS':>{name + 6}} held out{legend}"
     lines = [Content.from_markup("[dim]$head[/]", head=head)]
     for number, stair in enumerate(shown):
@@ -257,6 +257,10 @@ def fails_text(view: "View | None", shown: int, wide: bool) -> Content:
     return Content("\n").join(lines)
 
 
+IN_JSON, ON_SCREEN = "excluded: see bad_readings", "excluded: e shows which"
+"""Where excluded readings are named: in the answer of the verb, and here."""
+
+
 def advice_text(view: "View | None") -> Content:
     """The answer in one sentence, and what cannot be told apart."""
     if view is None:
@@ -267,7 +271,8 @@ def advice_text(view: "View | None") -> Content:
         said for said in remark_lines(diagnosis) if said.split(". ")[0] not in diagnosis["advice"]
     ]
     first = [(f"{micro(said)}\n", "$ink-warning") for said in told]
-    text = Content.assemble(*first, mark, micro(diagnosis["advice"]))
+    says = micro(diagnosis["advice"]).replace(IN_JSON, ON_SCREEN)
+    text = Content.assemble(*first, mark, says)
     for group in diagnosis["indistinguishable"]:
         if all(name in diagnosis["advice"] for name in group):
             continue  # the answer says so itself
@@ -275,13 +280,16 @@ def advice_text(view: "View | None") -> Content:
     return text
 
 
-def found_text(view: "View | None") -> Content:
-    """Effects in the model with their sizes."""
-    if view is None or not view.effects:
+def found_text(search: "Search | None") -> Content:
+    """Effects in the model: how each was called for, its sizes, what it may be instead."""
+    view = search.view if search is not None else None
+    if search is None or view is None or not view.effects:
         return Content.from_markup("[dim]geometry only[/]")
+    came = {stair.did.removeprefix("+ "): stair for stair in search.stairs}
     lines = []
     for effect in view.effects:
-        lines.append(Content.assemble((effect, "bold")))
+        stair = came.get(effect)
+        lines.append(Content.assemble((effect, "bold"), (_called(stair), "dim")))
         stem = f"{effect}."
         own = {
             each["name"].removeprefix(stem): size_text(each, sign="±")
@@ -290,7 +298,19 @@ def found_text(view: "View | None") -> Content:
         }
         longest = max(map(len, own), default=0)
         lines += [Content(f"  {name:<{longest}} {size}") for name, size in own.items()]
+        lines += [Content.assemble((f"  ! {doubt}", "$ink-warning")) for doubt in _doubts(stair)]
     return Content("\n").join(lines)
+
+
+def _doubts(stair: "Stair | None") -> list[str]:
+    if stair is None:
+        return []
+    rivals = [f"or {', '.join(stair.rivals)}?"] if stair.rivals else []
+    return rivals + (["weak: chance does so, too"] if stair.weak else [])
+
+
+def _called(stair: "Stair | None") -> str:
+    return "" if stair is None or stair.p_value is None else f"  p {p_text(stair.p_value)}"
 
 
 def candidate_row(candidate: dict[str, Any], shapes: Collection[str], wide: bool) -> list[Text]:

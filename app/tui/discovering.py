@@ -152,6 +152,13 @@ def _refused(name: str, before: float, after: float) -> BadInput:
         )
     return BadInput(
         f"{name} is not accepted: poses that the fit has not seen would be predicted worse "
-        f"({1000 * before:.2f} -> {1000 * after:.2f} um)",
+        f"({_apart(1000 * before, 1000 * after)} um)",
         remedy="It fits noise. Choose another, or measure more",
     )
+
+
+def _apart(before: float, after: float) -> str:
+    """Two numbers with as many digits as tell them apart, two at least and five at most."""
+    both = (before, after)
+    texts = ([f"{value:.{digits}f}" for value in both] for digits in range(2, 6))
+    return " -> ".join(next((one for one in texts if one[0] != one[1]), [f"{v:.5f}" for v in both]))

@@ -13,7 +13,7 @@ from textual.widgets import DataTable
 from app.files.machines import load_machine
 from app.session.events import GateChecked, WriteBackStage
 from app.tui.apply import gates_text, grouped, rows_of
-from app.tui.discover import largest_text, stairs_text
+from app.tui.discover import found_text, largest_text, stairs_text
 from app.tui.program import Workbench
 from app.tui.verify import running_text
 from app.tui.widgets.plots import MissPlot, Spaced
@@ -150,6 +150,26 @@ def test_no_effect_has_its_name_cut_off_in_the_staircase_of_a_narrow_screen() ->
         lines = str(stairs_text(named, 7, 5)).split("\n")
         assert lines[1].startswith(f"+ {effect.id} ")
         assert max(map(len, lines)) <= NARROW
+
+
+def test_the_legend_of_the_staircase_is_whole_or_left_out() -> None:
+    search = stream.searched()
+    for did, whole in (("+ backlash", True), ("+ leg-compliance", False)):
+        named = replace(search, stairs=[replace(search.stairs[-1], did=did)])
+        head = str(stairs_text(named, 12, 4)).split("\n")[0]
+        assert head.endswith(" ░noise █left" if whole else "held out")
+        assert len(head) <= 42
+
+
+def test_how_an_effect_was_called_for_and_what_it_may_be_instead_stay_in_sight() -> None:
+    search = stream.searched()
+    effect = search.present.effects[-1]
+    stair = replace(search.stairs[-1], did=f"+ {effect}", p_value=0.02, weak=True)
+    stair = replace(stair, rivals=("screw-pitch", "contact"))
+    said = str(found_text(replace(search, stairs=[stair])))
+    assert f"{effect}  p 0.02\n" in said
+    assert "  ! or screw-pitch, contact?\n  ! weak: chance does so, too" in said
+    assert str(found_text(replace(search, stairs=[]))).startswith(f"{effect}\n")
 
 
 def test_a_ratio_has_no_unit_written_after_it() -> None:
