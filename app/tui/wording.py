@@ -25,9 +25,9 @@ def said(error: Exception) -> tuple[str, str]:
 def micro(text: str) -> str:
     """Words of the program as the screens show them: ``um`` is micrometres, in no path or name.
 
-    A terminal that has no such sign gets its ``u`` back (:mod:`app.tui.signs`).
+    ``+-`` is one sign, too. A terminal that has none gets its own back (:mod:`app.tui.signs`).
     """
-    return _UM.sub("µm", text)
+    return _UM.sub("µm", text).replace(" +- ", " ± ")
 
 
 def channel_text(channels: Mapping[str, Any]) -> str:

@@ -66,3 +66,4 @@ def test_micrometres_have_one_sign_on_the_screens_and_paths_keep_their_letters()
     for name in ("runs/um/run", "um.toml", "album", "um-2"):
         assert micro(f"in {name}") == f"in {name}"
     assert in_ascii(micro("7 um")) == "7 um"
+    assert micro("over 4.1 +- 1.2 min, +-5 V") == "over 4.1 ± 1.2 min, +-5 V"
