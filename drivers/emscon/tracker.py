@@ -4,20 +4,14 @@ import asyncio
 from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 
-from drivers import plausible
 from drivers.emscon import wire
 from drivers.emscon.codes import (
-    Angle,
-    Coordinates,
     Event,
     LaserStatus,
-    Length,
     MeasurementMode,
     PacketType,
-    Pressure,
     ProcessorStatus,
     Status,
-    Temperature,
     TrackerStatus,
     WeatherMonitor,
     status_words,
@@ -25,7 +19,9 @@ from drivers.emscon.codes import (
 from drivers.emscon.link import EmsconLink
 from drivers.emscon.measurement import Measurement, refusal
 from drivers.emscon.results import reading, samples
+from drivers.emscon.setting_up import identify, set_up
 from drivers.emscon.settings import EmsconSettings
+from drivers.emscon.weather import channels_of, lacks_object_sensor, require_weather
 from drivers.errors import BeamBroken, DeviceError, LinkLost, NoTarget, Refused, Silence
 from drivers.interface import (
     Alarm,
@@ -37,10 +33,8 @@ from drivers.interface import (
 )
 from drivers.stopping import stopped
 
-INITIALIZE_S = 90.0
 POINT_S = 60.0
 LONGEST_PACKET_GAP_S = 1.0
-AIR = {"air_temp_C": "temperature", "pressure_hPa": "pressure", "humidity": "humidity"}
 
 
 class EmsconTracker:
@@ -99,7 +93,7 @@ class EmsconTracker:
         link = await EmsconLink.open(host or port, int(port) if host else 700, timeout)
         tracker = cls(link, time_scale, settings)
         try:
-            tracker.identity = await tracker._identify()
+            tracker.identity = await identify(tracker._ask)
         except BaseException:
             await tracker.close()
             raise
@@ -142,65 +136,20 @@ class EmsconTracker:
         Raises NotReady, Refused, Silence, LinkLost.
         """
         self._cached.clear()
-        await self._ask(
-            "SetUnits", length=Length.MILLIMETRE, angle=Angle.RADIAN, humidity=0,
-            temperature=Temperature.CELSIUS, pressure=Pressure.HPA,
-        )  # fmt: skip
-        if self._settings.environment is not None:
-            temperature, pressure, humidity = self._settings.environment
-            await self._ask(
-                "SetEnvironmentParams",
-                temperature=temperature,
-                pressure=pressure,
-                humidity=humidity,
-            )
-        system = await self._ask("GetSystemStatus")
-        if system.integer("processor") != ProcessorStatus.INITIALIZED:
-            await self._ask("Initialize", INITIALIZE_S)
-        await self._ask("SetCoordinateSystemType", coordinates=Coordinates.RIGHT_HANDED)
-        await self._ask(
-            "SetSystemSettings", weather_monitor=self._settings.weather_monitor,
-            apply_transformation=0, apply_orientation=0, keep_last_position=1, send_unsolicited=1,
-            send_reflector_position=0, try_mode=0, has_nivel=0, has_video=0,
-        )  # fmt: skip
-        await self._ask("SetStatisticMode", stationary=1, continuous=0)
-        await self._ask(
-            "SetSearchParams",
-            radius=self._settings.search_radius_mm,
-            timeout_ms=round(1000.0 * self._settings.search_timeout_s),
-        )
+        await set_up(self._ask, self._settings)
         await self.reflectors()
         if self.can.weather:
-            await self._require_weather()
+            await require_weather(self._ask, self._link.device)
         if self._settings.object_sensor is None:
             self.can = replace(self.can, object_temperature=await self._has_object_sensor())
 
-    async def _require_weather(self) -> None:
-        """Refraction is a person's decision: without a station somebody must state the air."""
-        try:
-            await self._ask("GetEnvironmentParams")
-        except Refused as error:
-            raise Refused(
-                f"it has no weather station ({error.what})",
-                device=self._link.device,
-                remedy='Connect it, or write weather = "off" and environment = [deg C, hPa, %] '
-                "under [tracker] in the site file",
-            ) from error
-
     async def _has_object_sensor(self) -> bool:
-        """Ask for the object's temperature once; a refusal means that nothing measures it."""
-        try:
-            await self._ask("GetObjectTemperature")
-        except Refused as error:
-            self._say(
-                Alarm(
-                    self._link.device,
-                    f"no sensor of the object's temperature ({error.what})",
-                    "Connect one, or measure without: thermal growth then stays unseen.",
-                )
-            )
-            return False
-        return True
+        why = await lacks_object_sensor(self._ask)
+        if why:
+            what = f"no sensor of the object's temperature ({why})"
+            remedy = "Connect one, or measure without: thermal growth then stays unseen."
+            self._say(Alarm(self._link.device, what, remedy))
+        return not why
 
     async def reflectors(self) -> dict[str, int]:
         """Name and identifier of every reflector that the tracker knows."""
@@ -299,17 +248,7 @@ class EmsconTracker:
 
     async def channels(self) -> dict[str, float]:
         """What it measures of object and air: deg C, hPa, relative humidity in %."""
-        found = {}
-        device = self._link.device
-        if self.can.object_temperature:
-            thing = await self._ask("GetObjectTemperature")
-            temperature = thing.real("temperature")
-            found["structure_temp_C"] = plausible.weather("temperature", temperature, device)
-        if self.can.weather:
-            air = await self._ask("GetEnvironmentParams")
-            for name, field in AIR.items():
-                found[name] = plausible.weather(field, air.real(field), device)
-        return found
+        return await channels_of(self._ask, self.can, self._link.device)
 
     async def stop(self) -> None:
         """End any measurement; never raises for a second call."""
@@ -325,16 +264,6 @@ class EmsconTracker:
             )
             self._measurement.fail(closed)
         await self._link.close()
-
-    async def _identify(self) -> Identity:
-        try:
-            info = await self._ask("GetTrackerInfo")
-        except Refused:
-            system = await self._ask("GetSystemStatus")
-            return Identity("emscon", serial=str(system.integer("serial")))
-        firmware = f"{info.integer('major')}.{info.integer('minor')}"
-        serial = str(info.integer("serial"))
-        return Identity("emscon", "", info.text("name"), serial, firmware)
 
     async def _ask(self, name: str, device_s: float = 0.0, /, **values: wire.Value) -> wire.Packet:
         """Exchange that may take ``device_s`` of device time; statuses become typed errors."""
