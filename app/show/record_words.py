@@ -21,6 +21,16 @@ def record_lines(report: Mapping[str, Any]) -> list[str]:
     return [*lines, ""] if lines else []
 
 
+def of_noise(report: Mapping[str, Any]) -> list[str]:
+    """What RMS, floors and chi-square count with, where noise other than the stated was found."""
+    if not report["noise"]["components"]:
+        return []
+    return [
+        "(perfect: with the noise that was found, whatever makes it; chi-square: by the stated "
+        "uncertainties)"
+    ]
+
+
 def remark_lines(report: Mapping[str, Any]) -> list[str]:
     """One line for each hypothesis, for screens: what is wrong, what was done about it."""
     return [f"{one['says']}. {one['done']}." for one in report.get("record", ())]

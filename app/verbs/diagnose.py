@@ -68,7 +68,7 @@ def command(
 
 def words(report: dict[str, Any]) -> str:
     """Say a diagnosis to a person."""
-    from app.show.record_words import record_lines
+    from app.show.record_words import of_noise, record_lines
 
     base = report["baseline"]
     lines = [
@@ -77,6 +77,7 @@ def words(report: dict[str, Any]) -> str:
         f"RMS {um(base['rms_um'])} (perfect model {um(base['noise_floor_um'])}), held-out poses "
         f"{um(base['holdout_rms_um'])} (perfect {um(base['holdout_floor_um'])}), "
         f"chi-square per degree of freedom {base['chi2_per_dof']:.3f}",
+        *of_noise(report),
         "",
         text_table(
             ("effect", "p", "RMS after", "held-out after", "visible", "size"),

@@ -75,7 +75,7 @@ def command(
 
 def words(report: dict[str, Any]) -> str:
     """Say a discovery to a person: the staircase, what was found, what to do next."""
-    from app.show.record_words import record_lines
+    from app.show.record_words import of_noise, record_lines
 
     steps = [
         (
@@ -97,6 +97,7 @@ def words(report: dict[str, Any]) -> str:
             ("step", "RMS", "perfect", "held-out", "perfect", "chi2/dof", "p"),
             steps,
         ),
+        *of_noise(report),
         "",
         *_in_the_model(report),
         *(f"  {line}" for line in sizes(report["parameters"])),

@@ -54,7 +54,7 @@ def command(
 
 def words(report: dict[str, Any]) -> str:
     """Say a fit to a person."""
-    from app.show.record_words import excluded_lines, record_lines
+    from app.show.record_words import excluded_lines, of_noise, record_lines
 
     lines = [
         *record_lines(report),
@@ -64,6 +64,7 @@ def words(report: dict[str, Any]) -> str:
         *_kinds(report),
         f"chi-square per degree of freedom {report['chi2_per_dof']:.3f} (1 is perfect), "
         f"p = {chance(report['log10_p'])}",
+        *of_noise(report),
         "",
         text_table(
             ("parameter", "value", "+-", "change", "in sigmas", "unit", ""),

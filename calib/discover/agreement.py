@@ -133,7 +133,10 @@ def more_than_noise(fitted: Fit) -> str:
         return ""
     return (
         "More is left than noise alone leaves: the machine file or the effects lack something, or "
-        "the readings' uncertainties are stated too small; pkmcal diagnose tells which"
+        "the readings' uncertainties are stated too small; pkmcal diagnose tells which. The +- "
+        "here count with what is stated: they are too small by a factor of "
+        f"{math.sqrt(fitted.chi2_per_dof):.2g} if what is left is noise; if it is an effect, "
+        "values may be off by more"
     )
 
 
