@@ -17,7 +17,7 @@ from calib.chance import chi2_above
 from calib.evidence.problem import LinearProblem
 from calib.noise.component import WHITE, Noise, Taking
 from calib.noise.likelihood import Likelihood, spread
-from calib.noise.scatter import tails, uneven
+from calib.noise.scatter import ACROSS, ALONG, tails, uneven
 from calib.noise.score import promising
 from calib.noise.sizes import FAINT, Sizes, joined, settled
 
@@ -172,7 +172,10 @@ class _Bar:
 
 
 def _pointed(likelihood: Likelihood, now: Sizes, bar: _Bar) -> list[str]:
-    """Components of scatter that a score test points to, beside what there is."""
+    """Components of scatter that a score test points to, beside what there is.
+
+    Along and across the beam it says the same with another sign: they count for one.
+    """
     names = [part for part in likelihood.uneven if part not in now.parts]
     if not names:
         return []
@@ -183,8 +186,12 @@ def _pointed(likelihood: Likelihood, now: Sizes, bar: _Bar) -> list[str]:
         float(one) if scatter.is_added(name) else abs(float(one))
         for name, one in zip(names, far, strict=True)
     ]
-    ranked = np.argsort(-np.array(told), kind="stable")[:TRIED]
-    return [names[k] for k in ranked if told[k] > POINTED]
+    found: list[str] = []
+    for k in np.argsort(-np.array(told), kind="stable"):
+        twins = {ALONG, ACROSS} == {names[k], *found[-1:]}
+        if told[k] > POINTED and (twins or len(set(found) - {ACROSS}) < TRIED):
+            found.append(names[k])
+    return found
 
 
 def _pruned(likelihood: Likelihood, now: Sizes, bar: _Bar) -> Sizes:

@@ -26,8 +26,8 @@ WIDEST = 0.1
 """Difference of logs that gives a slope, at most; less where half a standard deviation is less."""
 HOPE = 4.0
 """Rise of log L that is hoped for, over what is expected."""
-EDGE, NARROW = 2.0, 0.1
-"""Rise of log L within which a size at its end is asked about, from how near none has been."""
+EDGE, FAR_WORSE, NARROW = 2.0, 5.0, 0.5
+"""Rises of log L, and a distance, that make a best size unsure (see :func:`_unsure`)."""
 FLAT = 1e-2
 """Least curvature of log L that is taken for one."""
 
@@ -95,9 +95,10 @@ def along(
     for _ in range(REFINED):
         place, fall, curvature = _between(np.array(at), np.array(values))
         if fall < WORTH:
-            if min(values) - EDGE > below or not _unknown_edge(at, values):
+            beside = _unsure(at, values) if min(values) - EDGE < below else None
+            if beside is None:
                 break
-            place = _from_edge(at, values)
+            place = beside
         elif min(values) - HOPE * fall > below:
             break
         at.append(place)
@@ -106,16 +107,20 @@ def along(
     return at[best], values[best], curvature
 
 
-def _unknown_edge(at: Sequence[float], values: Sequence[float]) -> bool:
-    """Whether a function is least, so far, at an end of which nothing near has been asked."""
-    best = at[int(np.argmin(values))]
-    return best in (min(at), max(at)) and abs(_from_edge(at, values) - best) > NARROW
+def _unsure(at: Sequence[float], values: Sequence[float]) -> float | None:
+    """A place beside the best one, where nothing near it was asked and all that was is far worse.
 
-
-def _from_edge(at: Sequence[float], values: Sequence[float]) -> float:
-    best = at[int(np.argmin(values))]
-    nearest = sorted(at, key=lambda one: abs(one - best))[1]
-    return best + 0.2 * (nearest - best)
+    Or where the best is at an end: what is between it and the next is then not known at all.
+    """
+    order = np.argsort(at)
+    x, y = np.array(at)[order], np.array(values)[order]
+    best = int(np.argmin(y))
+    beside = [k for k in (best - 1, best + 1) if 0 <= k < x.size]
+    next_best = min(beside, key=lambda k: float(y[k]))
+    if len(beside) == 2 and y[next_best] - y[best] < FAR_WORSE:
+        return None
+    place = float(x[best] + 0.2 * (x[next_best] - x[best]))
+    return place if np.min(np.abs(x[beside] - x[best])) > NARROW else None
 
 
 def _between(at: Array, values: Array) -> tuple[float, float, float]:
