@@ -46,6 +46,8 @@ class Findings:
         Channels as they were at the end of the last run.
     creep : Creep, optional
         What was left then of a warm-up, where one was found.
+    not_asked : mapping of str to str
+        Effects that these readings cannot show, and why.
     """
 
     runs: tuple[str, ...]
@@ -56,6 +58,7 @@ class Findings:
     predicted_um: float
     conditions: Mapping[str, float] = field(default_factory=dict)
     creep: Creep | None = None
+    not_asked: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def from_json(cls, line: Mapping[str, Any]) -> "Findings":
@@ -65,6 +68,7 @@ class Findings:
             tuple((a, b) for a, b in line["ambiguous"]), line["unexplained"],
             line["predicted_um"], line["conditions"],
             Creep(**line["creep"]) if line.get("creep") else None,
+            line.get("not_asked", {}),
         )  # fmt: skip
 
     def words(self) -> str:
@@ -101,6 +105,7 @@ def look(runs: tuple[str, ...], model: Path) -> Findings:
         predicted(corrector),
         {name: ends[1] for name, ends in _channels(corrector).items()},
         creep_of(corrector, _last_s(runs[-1]), _fresh(corrector.machine)),
+        dict(report.unavailable),
     )
 
 

@@ -16,6 +16,7 @@ def report_of(pilot: Autopilot, last: Decision, folder: Path) -> AutoReport:
     found = journal.of("found")
     latest: dict[str, Any] = found[-1] if found else {}
     seen = [line for line in done.values() if "verified_um" in line]
+    written = [line for line in done.values() if "left_out" in line]
     said = {
         "format": AutoReport.FORMAT,
         "folder": str(folder),
@@ -39,6 +40,8 @@ def report_of(pilot: Autopilot, last: Decision, folder: Path) -> AutoReport:
             for line in done.values()
             if HOPELESS in line and "run" not in line
         },
+        "not_asked": latest.get("not_asked", {}),
+        "not_written": written[-1]["left_out"] if written else {},
         "poses": sum(int(line.get("poses", 0)) for line in done.values()),
         "minutes": sum(float(line.get("minutes", 0.0)) for line in done.values()),
         "predicted_um": latest.get("predicted_um"),

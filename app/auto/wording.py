@@ -7,6 +7,7 @@ from typing import Any
 
 from app.auto.decision import Decision
 from app.auto.policy import LONGEST_MIN, MOST
+from app.jobs.automatic import AutoReport
 
 GO, SKIP, STOP = "go on", "skip", "stop"
 COUNT = f"or how many, up to {MOST}: 20 poses"
@@ -77,3 +78,13 @@ def found_words(found: Mapping[str, Any]) -> str:
     doubts = "".join(f"; {a} or {b}?" for a, b in found["ambiguous"])
     unknown = "; something unknown is left" if found["unexplained"] else ""
     return f"found: {effects}{doubts}{unknown}; {found['predicted_um']:.1f} um predicted"
+
+
+def open_words(report: AutoReport) -> list[str]:
+    """What an automatic calibration leaves open, a line for each kind of it and each reason."""
+    lines = [f"in question: {pair}: {why}" for pair, why in report.in_question.items()]
+    for what, effects in (("asked", report.not_asked), ("written", report.not_written)):
+        for why in dict.fromkeys(effects.values()):
+            names = ", ".join(name for name, own in effects.items() if own == why)
+            lines.append(f"not {what}: {names} ({why})")
+    return lines

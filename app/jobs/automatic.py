@@ -31,7 +31,9 @@ class AutoReport(Report):
     ``reached``: whether the target holds at fresh poses; None where nothing was to be written.
     ``predicted_um``, ``verified_um``: RMS of the position error at fresh poses, the latter without
     the tracker's part; ``at_most_um`` is its 95 % limit. ``minutes``: machine time of all readings.
-    ``in_question``: pairs of effects that stayed so, and why.
+    ``in_question``: pairs of effects that stayed so, and why. ``not_asked``: effects that the
+    readings cannot show (no load is known, no temperature was read), ``not_written``: effects that
+    were found and stay in the machine; each with the reason.
     """
 
     FORMAT: ClassVar[str] = "pkm-auto/1"
@@ -44,6 +46,8 @@ class AutoReport(Report):
     model: str | None
     effects: tuple[str, ...]
     in_question: Mapping[str, str]
+    not_asked: Mapping[str, str]
+    not_written: Mapping[str, str]
     poses: int
     minutes: float
     predicted_um: float | None

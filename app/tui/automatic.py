@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from app.auto.decision import Limits
 from app.auto.journal import NAME, Decisions
-from app.auto.wording import understood
+from app.auto.wording import open_words, understood
 from app.errors import GateRefused, StoppedByOperator
 from app.session import events as ev
 from app.session.session import Session
@@ -103,6 +103,8 @@ class Automatic:
         self._desk.picture.run = "finished"
         self._desk.study.choose(report.runs)
         self._desk.study.effects = report.effects
+        for line in open_words(report):
+            self._desk.picture.write(line, "warn")
         self._desk.picture.write(report.why, "good" if report.reached else "warn")
 
     def _tell(self, text: str) -> None:

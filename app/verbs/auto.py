@@ -116,13 +116,15 @@ async def ask(text: str, answers: tuple[str, ...], typed: str) -> str:
 
 def words(report: AutoReport) -> str:
     """Say how it went to a person."""
+    from app.auto.wording import open_words
+
     outcome = {True: "reached", False: "not reached", None: "nothing was to be written"}
     lines = [
         f"target {report.target_um:g} um: {outcome[report.reached]}. {report.why}",
         f"{report.poses} poses in {report.minutes:.0f} min of machine time; "
         f"effects: {', '.join(report.effects) or 'none'}",
     ]
-    lines += [f"in question: {pair}: {why}" for pair, why in report.in_question.items()]
+    lines += open_words(report)
     lines.append(f"journal: {report.folder}")
     if report.model is not None:
         lines.append(f"model: {report.model}")

@@ -14,6 +14,7 @@ from app.auto.decision import Decision, Limits
 from app.auto.journal import NAME, Decisions
 from app.auto.known import known_by
 from app.auto.report import report_of
+from app.auto.wording import open_words
 from app.errors import GateRefused, StoppedByOperator
 from app.files.pose_table import Pose, poses_text
 from app.jobs.posing import choose_poses
@@ -91,7 +92,7 @@ def fly(folder: Path, laboratory: Simulated, **more: object) -> tuple[Autopilot,
 CREEP = {"effect": "leg-warm-up", "left_um": 40.0, "tau_min": 15.0}
 
 
-def measured(folder: Path, creep: Mapping[str, object] | None = None) -> None:
+def measured(folder: Path, creep: Mapping[str, object] | None = None, **more: object) -> None:
     """A journal in which a first set was measured, and found good enough."""
     journal = Decisions(folder)
     journal.write("begun", seed=1, limits={"target_um": 8.0, "first": 12, "apply": True})
@@ -100,7 +101,7 @@ def measured(folder: Path, creep: Mapping[str, object] | None = None) -> None:
     journal.write("done", number=1, run="one", poses=12, minutes=24.0)
     journal.write(
         "found", runs=["one"], model="model-01.toml", effects=["leg-warm-up"], ambiguous=[],
-        unexplained=False, predicted_um=3.0, conditions={}, creep=creep,
+        unexplained=False, predicted_um=3.0, conditions={}, creep=creep, **more,
     )  # fmt: skip
 
 
@@ -242,6 +243,22 @@ def test_a_machine_that_creeps_is_let_warm_up_before_it_is_written_and_proven(
     assert wait.minutes == 45.0
     assert wait.expected == pytest.approx({"creeps_um": 40.0, "creeps_um_then": 40.0 * exp(-3.0)})
     assert wait.came == "kept moving for 45 min"
+
+
+def test_what_was_not_asked_and_not_written_is_said_at_the_end(tmp_path: Path) -> None:
+    class Poor(Simulated):
+        async def apply(self, model: Path) -> Mapping[str, str]:
+            return {"thermal-growth": "the controller has no compensation for it"}
+
+    unknown = "run.toml has no [load]"
+    measured(tmp_path, not_asked=dict.fromkeys(("gravity-sag", "base-bending"), unknown))
+    pilot, last = fly(tmp_path, Poor(tmp_path))
+    report = report_of(pilot, last, tmp_path)
+    assert faults_of(report.to_json()) == []
+    assert open_words(report) == [
+        "not asked: gravity-sag, base-bending (run.toml has no [load])",
+        "not written: thermal-growth (the controller has no compensation for it)",
+    ]
 
 
 def test_a_person_says_how_long_it_warms_up_or_that_it_does_not(tmp_path: Path) -> None:

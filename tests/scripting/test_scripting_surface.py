@@ -72,8 +72,8 @@ MADE = "site, *, folder='sessions', operator=None, watch=None"
 FIELDS = {
     "AcceptReport": "accepted",
     "ApplyReport": "written changes left_out snapshot kept check_before check_after noise_peak_um",
-    "AutoReport": "folder target_um reached why decisions runs model effects in_question poses "
-    "minutes predicted_um verified_um at_most_um",
+    "AutoReport": "folder target_um reached why decisions runs model effects in_question "
+    "not_asked not_written poses minutes predicted_um verified_um at_most_um",
     "CompareReport": "effects readings rms_um noise_floor_um chi2_per_dof repeatability "
     "reference_repeatability structure together actuators worst_poses bad_readings record advice "
     "noise proposed",
