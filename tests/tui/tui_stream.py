@@ -339,6 +339,8 @@ def fitted() -> FitAnswer:
         "holdout_rms_um": 9.65,
         "holdout_floor_um": 9.18,
         "chi2_per_dof": 1.02,
+        "p_value": 0.43,
+        "remarks": [],
         "parameters": parameters,
         "unidentified": [[name] for name in alone],
         "unidentified_words": [f"{name} is not seen" for name in alone],
