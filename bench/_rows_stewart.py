@@ -5,6 +5,7 @@ are written put it; a controller that knows nothing of the twist commanded them 
 """
 
 import tomllib
+from functools import cache
 from importlib.resources import files
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 Vector = np.ndarray
 
 
+@cache
 def geometry() -> tuple[Vector, Vector, float]:
     """Base and platform joints (3, 6), and the height at home, of the shipped machine file."""
     table = tomllib.loads(files("calib.machines").joinpath("stewart.toml").read_text())
