@@ -1,11 +1,11 @@
 """How far a machine is from where it will be once it is warm, by a model with a warm-up in it."""
 
 import numpy as np
-from scipy.stats import chi2
 
 from app.auto.decision import Creep
 from app.jobs.corrector import Corrector
 from calib.arrays import Array
+from calib.chance import chi2_above
 from calib.mechanism.axes import units_of
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.rigid import Poses
@@ -62,7 +62,7 @@ def _left(corrector: Corrector, effect: str, last_s: float, by_axis: Array) -> C
     covariance = corrector.saved.covariance_of([*names, tau])
     covariance = np.where(np.isfinite(covariance), covariance, 0.0)
     told = float(found @ np.linalg.pinv(covariance)[:-1, :-1] @ found)
-    if chi2.sf(told, found.size) > NOTHING:
+    if chi2_above(found.size, told) > NOTHING:
         return Creep(effect, 0.0, tau_s / 60.0)
     slopes = np.concatenate([moves, left[None] * last_s / tau_s**2])
     open_ = float(np.einsum("ukp,uv,vkp->", slopes, covariance, slopes))
