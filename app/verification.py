@@ -20,10 +20,11 @@ from app.defaults import REFERENCE_EVERY
 from app.files.pose_table import Pose
 from app.files.site import Site, load_site
 from app.files.text import read_text
-from app.session.journal import PARAMETERS, PLANNED, Journal, Row
+from app.session.journal import PARAMETERS, Journal
 from app.session.kinds import TRUTH
 from app.session.plan import Plan
 from app.session.plans import PlanOptions, measure_plan, order_for
+from app.session.rows import PLANNED, Row
 from calib.arrays import Array
 from calib.errors import BadInput
 from calib.frames import Frame, fit_frame

@@ -10,8 +10,9 @@ from app.files.site import Site
 from app.files.site_gauge import GaugeSite
 from app.files.text import read_text
 from app.session.gauge_export import sensed_rows
-from app.session.journal import FRAME, IDENTITIES, PARAMETERS, Journal, Row
+from app.session.journal import FRAME, IDENTITIES, PARAMETERS, Journal
 from app.session.plan import Plan
+from app.session.rows import Row
 from calib.arrays import Array
 from calib.runs import Digits, Header, Run, covariance_matrices
 from calib.runs.sensing import Setup

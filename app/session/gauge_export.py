@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from app.session.gauge_rows import GAUGE
-from app.session.journal import Row
+from app.session.rows import Row
 from calib.arrays import Array
 from calib.runs.sensing import DISTANCE, KINDS, Sensing, Setup
 

@@ -1,6 +1,7 @@
 """Rows of a journal that hold a gauge's number, in ``raw`` under :data:`GAUGE`."""
 
-from app.session.journal import Journal, Row
+from app.session.journal import Journal
+from app.session.rows import Row
 
 GAUGE = "gauge"
 

@@ -8,10 +8,8 @@ reason.
 
 import errno
 import json
-import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -19,72 +17,14 @@ from typing import Any
 from app.session.journal_file import checksum, opened
 from app.session.kinds import KINDS
 from app.session.plan import Plan
+from app.session.rows import PLANNED, NewRow, Row, StepState, row_of
 from calib.errors import BadInput
 
 PARAMETERS, SMRS, FRAME = "controller_parameters", "smrs", "controller_frame"
 IDENTITIES = "identities"
 """Facts about a session: what the controller held at connect, nest of each SMR by its number, what
 the poses of a closed controller refer to."""
-PENDING = ("planned", "started", "failed")
 _GOOD_READING = "kind = 'reading' AND status = 'good'"
-
-
-@dataclass(frozen=True)
-class StepState:
-    """Where a step is: its last log entry, whose number is ``entry`` (0: there is none)."""
-
-    state: str
-    attempt: int
-    result: Mapping[str, Any]
-    entry: int = 0
-
-    @property
-    def pending(self) -> bool:
-        """Whether the step is still to be done."""
-        return self.state in PENDING
-
-
-PLANNED = StepState("planned", 0, {})
-
-
-@dataclass(frozen=True)
-class Row:
-    """A move or a reading; ``xyz`` (tracker frame, mm) and ``covariance`` only for readings."""
-
-    seq: int
-    step: str
-    kind: str
-    status: str
-    why: str
-    time_s: float
-    pose: str
-    nest: str
-    q: tuple[float, ...]
-    xyz: tuple[float, float, float] | None
-    covariance: tuple[float, ...] | None
-    delay_s: float | None
-    cycle: int | None
-    channels: Mapping[str, float]
-    raw: Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class NewRow:
-    """What the engine hands over to be written; meanings as in :class:`Row`."""
-
-    kind: str
-    time_s: float
-    pose: str
-    q: tuple[float, ...]
-    nest: str = ""
-    xyz: tuple[float, float, float] | None = None
-    covariance: tuple[float, ...] | None = None
-    delay_s: float | None = None
-    cycle: int | None = None
-    channels: Mapping[str, float] | None = None
-    raw: Mapping[str, Any] | None = None
-    status: str = "good"
-    why: str = ""
 
 
 class Journal:
@@ -263,7 +203,7 @@ class Journal:
     def rows(self, *, good_only: bool = True) -> list[Row]:
         """Every move and reading in the order in which it happened."""
         where = "WHERE status = 'good'" if good_only else ""
-        return [_row(row) for row in self._db.execute(f"SELECT * FROM rows {where} ORDER BY seq")]
+        return [row_of(row) for row in self._db.execute(f"SELECT * FROM rows {where} ORDER BY seq")]
 
     def readings(self) -> int:
         """Count the good readings."""
@@ -294,7 +234,7 @@ class Journal:
     def last_row(self) -> Row | None:
         """The last move or reading, whatever became of it."""
         row = self._db.execute("SELECT * FROM rows ORDER BY seq DESC LIMIT 1").fetchone()
-        return _row(row) if row else None
+        return row_of(row) if row else None
 
     def last_time(self) -> float:
         """Latest machine time that stands in the journal, s."""
@@ -343,23 +283,3 @@ class Journal:
 
 def _summed(table: str, values: dict[str, Any]) -> dict[str, Any]:
     return {**values, "sum": checksum(table, values)}
-
-
-def _row(row: sqlite3.Row) -> Row:
-    return Row(
-        seq=row["seq"],
-        step=row["step"],
-        kind=row["kind"],
-        status=row["status"],
-        why=row["why"],
-        time_s=row["time_s"],
-        pose=row["pose"],
-        nest=row["nest"],
-        q=tuple(json.loads(row["q"])),
-        xyz=None if row["xyz"] is None else tuple(json.loads(row["xyz"])),
-        covariance=None if row["covariance"] is None else tuple(json.loads(row["covariance"])),
-        delay_s=row["delay_s"],
-        cycle=row["cycle"],
-        channels=json.loads(row["channels"]),
-        raw=json.loads(row["raw"]),
-    )

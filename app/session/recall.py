@@ -3,8 +3,8 @@
 import numpy as np
 
 from app.session.events import FrameFound
-from app.session.journal import PLANNED
 from app.session.kinds import DRIFT
+from app.session.rows import PLANNED
 from app.session.work import Work
 from calib.frames import fit_frame
 

@@ -38,11 +38,12 @@ from app.session.events import (
     Stopped,
 )
 from app.session.folder import RUN, make_folder, read_folder
-from app.session.journal import PLANNED, Journal, StepState
+from app.session.journal import Journal
 from app.session.pace import Pace
 from app.session.plan import Plan, Step
 from app.session.recall import recall
 from app.session.routines import ROUTINES
+from app.session.rows import PLANNED, StepState
 from app.session.station import Station
 from app.session.unwritten import UNWRITTEN, export_at_end, unwritten
 from app.session.within import JOURNAL

@@ -20,8 +20,9 @@ from app.session.events import (
     Suspended,
 )
 from app.session.hands import nobody_to_ask
-from app.session.journal import PARAMETERS, SMRS, Journal, NewRow
+from app.session.journal import PARAMETERS, SMRS, Journal
 from app.session.plan import Plan
+from app.session.rows import NewRow
 from app.session.seen import Seen
 from app.session.station import Station
 from calib.arrays import Array

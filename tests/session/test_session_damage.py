@@ -9,8 +9,9 @@ import pytest
 
 from app.session import kinds
 from app.session.facts import facts_of, sessions_under
-from app.session.journal import Journal, NewRow
+from app.session.journal import Journal
 from app.session.plan import Plan, Step
+from app.session.rows import NewRow
 from calib.errors import BadInput
 
 STEPS = tuple(Step(f"{k:04d}-read-a-{k}", kinds.READ, "", {"pose": "a"}) for k in range(12))

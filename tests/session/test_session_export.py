@@ -8,8 +8,9 @@ import numpy as np
 from app.files.machines import load_machine
 from app.files.site import parse_site
 from app.session.export import DIGITS, export_run, run_of
-from app.session.journal import Journal, Row
+from app.session.journal import Journal
 from app.session.plan import Plan
+from app.session.rows import Row
 from calib.runs import Header, format_points, format_run, parse_header, parse_run
 
 HEADER = Header("hexapod", platform_nests={"3": np.zeros(3), "4": np.ones(3)})

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from app.session import kinds
-from app.session.journal import Journal, NewRow
+from app.session.journal import Journal
 from app.session.plan import Plan, Step
+from app.session.rows import NewRow
 from calib.errors import BadInput
 
 PLAN = Plan(

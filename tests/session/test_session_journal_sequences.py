@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.session import kinds
-from app.session.journal import Journal, NewRow
+from app.session.journal import Journal
 from app.session.plan import Plan, Step
+from app.session.rows import NewRow
 
 STEPS = tuple(Step(f"000{k}-read-a-{k}", kinds.READ, "", {"pose": "a"}) for k in range(1, 4))
 PLAN = Plan("measure", "three", "hexapod", {"a": (0.0, 0.0, 220.0, 0.0, 0.0, 0.0)}, STEPS)

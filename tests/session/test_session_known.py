@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 from session_lab import Lab, lab_in
 
-from app.session.journal import Journal, NewRow
+from app.session.journal import Journal
 from app.session.known import FORMAT, Held, Snapshot, Snapshots, compare_with_known
+from app.session.rows import NewRow
 from app.writeback.transfer import Wanted, prove, write_volatile
 from calib.errors import BadInput
 from drivers.errors import ParameterError

@@ -14,7 +14,6 @@ from session_mock import POSES, Heard
 from app.files.machines import load_machine
 from app.session import events as ev
 from app.session import kinds
-from app.session.journal import NewRow
 from app.session.path import waypoints
 from app.session.plan import Plan, PlanWriter, Step
 from app.session.plans import warming_plan
@@ -24,6 +23,7 @@ from app.session.routines.moving import commanded_coordinates, ensure_at, take_s
 from app.session.routines.preparing import warm_up
 from app.session.routines.reading import in_band, read
 from app.session.routines.referencing import drift, reference
+from app.session.rows import NewRow
 from app.session.session import Session
 from app.session.station import Station
 from calib.errors import BadInput

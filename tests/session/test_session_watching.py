@@ -13,10 +13,10 @@ from session_mock import POSES, Heard, site_text
 
 from app.files.site import parse_site
 from app.session import events as ev
-from app.session.journal import NewRow
 from app.session.plans import PlanOptions, measure_plan
 from app.session.routines.beam import measured, settle
 from app.session.routines.watching import watch
+from app.session.rows import NewRow
 from app.session.session import Session
 from app.session.station import Devices
 from app.session.work import Work

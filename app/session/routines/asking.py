@@ -8,7 +8,7 @@ from app.errors import StoppedByOperator
 from app.files.site_gauge import GaugeSite
 from app.session.events import LiveScatter
 from app.session.gauge_rows import GAUGE, before
-from app.session.journal import NewRow
+from app.session.rows import NewRow
 from app.session.work import LeftOut, Work
 from drivers.errors import DeviceError, MeasurementError, NoNumber, NotReady, Silence
 from drivers.interface import GaugeReading

@@ -3,10 +3,10 @@
 import numpy as np
 
 from app.files.pose_table import HOME
-from app.session.journal import NewRow
 from app.session.plan import Step
 from app.session.routines.beam import measured
 from app.session.routines.moving import ensure_at
+from app.session.rows import NewRow
 from app.session.work import Done, Work
 from calib.arrays import Array
 from drivers.errors import BeamBroken, NoTarget

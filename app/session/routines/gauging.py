@@ -4,12 +4,12 @@ from app.errors import StoppedByOperator
 from app.files.site_gauge import GaugeSite
 from app.session.events import DriftChecked, NumberTaken
 from app.session.gauge_rows import GAUGE, before, last_said, numbers
-from app.session.journal import NewRow
 from app.session.plan import Step
 from app.session.routines.asking import About, number
 from app.session.routines.following import alive
 from app.session.routines.moving import ensure_at, go
 from app.session.routines.reading import in_band
+from app.session.rows import NewRow
 from app.session.spans import along, between
 from app.session.work import Done, Work
 from calib.digits import plus_minus

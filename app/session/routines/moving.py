@@ -9,9 +9,9 @@ from app.files.pose_table import HOME, Pose
 from app.hosted.controller import HostedController
 from app.session.answered import must_be_within_reach, must_belong
 from app.session.events import LivePose, PoseCommanded
-from app.session.journal import NewRow
 from app.session.plan import Step
 from app.session.routines.conditions import channels
+from app.session.rows import NewRow
 from app.session.work import Done, Work
 from calib.mechanism.description import Machine
 from calib.mechanism.rigid import Poses

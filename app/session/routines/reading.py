@@ -7,7 +7,6 @@ import numpy as np
 
 from app.files.pose_table import HOME
 from app.session.events import ReadingTaken
-from app.session.journal import NewRow
 from app.session.plan import Step
 from app.session.routines.beam import measured
 from app.session.routines.carrying import (
@@ -22,6 +21,7 @@ from app.session.routines.conditions import channels
 from app.session.routines.moving import ensure_at
 from app.session.routines.reverifying import reverify
 from app.session.routines.watching import watch
+from app.session.rows import NewRow
 from app.session.work import Done, Work
 from drivers.errors import NotReady
 from drivers.interface import TrackerReading

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from app.files.pose_table import HOME
-from app.session.journal import NewRow
+from app.session.rows import NewRow
 from app.session.work import Work
 from calib.look.temperatures import SENTINELS
 from drivers.errors import NotReady
