@@ -30,9 +30,11 @@ class NoiseComponentEntry(Record):
 class NoiseEntry(Record):
     """The noise that the readings demand; none of them: independent, as stated.
 
-    ``uncertainty_ratio``: uncertainties with it over those without, the median.
+    ``uncertainty_ratio``: uncertainties with it over those without, the median; ``instead``:
+    effects that would explain as much.
     """
 
     components: tuple[NoiseComponentEntry, ...]
     uncertainty_ratio: float
+    instead: tuple[str, ...] = ()
     words: str

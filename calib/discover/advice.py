@@ -67,7 +67,7 @@ def _of_physics(
     if poses < FEW_POSES:
         named = "one pose" if poses == 1 else f"{poses} poses"
         excluded += f" With {named} only large effects would show: measure more."
-    told = noise_words(found.fit)
+    told = noise_words(found.fit, found.noise_or)
     kinds = {one.name for one in found.fit.components_of_noise}
     scatter = "" if told and "scale" not in kinds else untrue_uncertainties(found.fit)
     if scatter and kinds <= {"scale"}:
@@ -92,7 +92,9 @@ def _of_physics(
         if told:
             excluded = excluded.removeprefix(" As to noise:")
             loose = loose_references(found.fit)
-            return f"Nothing else is missing:{excluded}" + (f" {loose}." if loose else "")
+            clearly = " clearly" if found.noise_or else ""
+            says = f"Nothing else is{clearly} missing:{excluded}"
+            return says + (f" {loose}." if loose else "")
         if loose := loose_references(found.fit):
             return f"Nothing is missing that these readings show. {loose}.{excluded}"
         return f"Nothing is missing: the model explains the readings to their noise.{excluded}"

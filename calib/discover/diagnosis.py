@@ -37,13 +37,15 @@ class Outlook:
 class RunDiagnosis:
     """A fit, what is missing from it, and the signatures of the candidates.
 
-    ``unavailable`` says why some effects of the catalogue cannot be seen in these readings.
+    ``unavailable`` says why some effects of the catalogue cannot be seen in these readings;
+    ``noise_or`` names those that explain as much as the noise of the fit does.
     """
 
     fit: Fit
     diagnosis: Diagnosis
     effects: tuple[EffectColumns, ...]
     unavailable: dict[str, str]
+    noise_or: tuple[str, ...] = ()
 
     @cached_property
     def holdout(self) -> HoldOut:

@@ -9,6 +9,7 @@ against noise by its evidence: where it says more than noise would, noise is wha
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,7 +18,9 @@ from calib.effects.component import Effect
 from calib.evidence.findings import Joined
 from calib.evidence.problem import LinearProblem
 from calib.identify.fitting import Fit, with_noise
-from calib.noise import Found, Taking, estimate, points_to_scatter
+from calib.identify.readings import MASKED
+from calib.identify.staged import fit_effects
+from calib.noise import Found, estimate, points_to_scatter
 
 CLEAR = float(np.log(1e-3))
 """log p of a test of structure, on its own, from which noise is asked for in an adequate model."""
@@ -25,6 +28,8 @@ SCATTER = 3.1
 """Standard deviations by which chi-square is off, from which the same holds."""
 SEARCHED = 12.0
 """What likelihood counts less for structure: it is the best of thousands of periods and ways."""
+TIED = 3.0
+"""Log of the odds, 20 to 1, up to which the readings prefer neither noise nor an effect."""
 ROUNDS = 3
 
 
@@ -49,7 +54,7 @@ def _judged(fit: Fit, catalogue: Sequence[Effect], seed: int) -> RunDiagnosis:
     if not _suspicious(white):
         return white
     problem, taking = fit.problem, fit.taking
-    kept, found = _beside(problem, taking, white.diagnosis.joined)
+    kept, found, tied = _beside(fit, catalogue, white.diagnosis.joined)
     structure = white.diagnosis.structure
     if structure is not None and structure.log_evidence > 0.0:
         smaller = _enlarged(problem, kept)
@@ -67,6 +72,7 @@ def _judged(fit: Fit, catalogue: Sequence[Effect], seed: int) -> RunDiagnosis:
         answer = diagnose_fit(noisy, catalogue, np.random.default_rng(seed))
         still = {one.name for one in answer.diagnosis.joined}
         left = tuple(one for one in kept if one.name in still)
+        answer = replace(answer, noise_or=tuple(name for name in tied if name not in still))
         if len(left) == len(kept):
             break
         kept = left
@@ -75,23 +81,51 @@ def _judged(fit: Fit, catalogue: Sequence[Effect], seed: int) -> RunDiagnosis:
 
 
 def _beside(
-    problem: LinearProblem, taking: Taking, joined: Sequence[Joined]
-) -> tuple[tuple[Joined, ...], Found]:
+    fit: Fit, catalogue: Sequence[Effect], joined: Sequence[Joined]
+) -> tuple[tuple[Joined, ...], Found, list[str]]:
     """Those of the effects called for that say more than noise would, and the noise beside them.
+
+    And the names of those that say as much as noise does.
 
     In the order of their evidence: one stays where the readings are likelier with it, and the noise
     that it leaves, than with the noise alone that they demand without it. Slow noise is so not
     taken for a drift, nor a drift for slow noise.
     """
     kept: tuple[Joined, ...] = ()
-    found = estimate(problem, taking)
+    problem, taking = fit.problem, fit.taking
+    found, tied = estimate(problem, taking), []
     for one in joined:
         larger = _enlarged(problem, (one,))
         beside = estimate(larger, taking)
-        told = max(one.log_evidence, _likelier(problem, larger))
-        if told + _worth(beside) > _worth(found):
+        told = max(one.log_evidence, _likelier(problem, larger)) + _worth(beside)
+        if told <= _worth(found) < 2.0 * told and not kept:
+            exact = _exact(fit, catalogue, one.name)
+            if exact is not None:
+                left = estimate(exact, taking)
+                surely = _likelier(problem, exact) + _worth(left)
+                if surely > told:
+                    beside, told = left, surely
+        if told > _worth(found):
             kept, found, problem = (*kept, one), beside, larger
-    return kept, found
+        elif told > _worth(found) - TIED:
+            tied.append(one.name)
+    return kept, found, tied
+
+
+def _exact(fit: Fit, catalogue: Sequence[Effect], name: str) -> LinearProblem | None:
+    """A fit with the effect, if it has something searched that lies between two trials.
+
+    Where a step is at a moment that was not tried, a few readings on its wrong side look like noise
+    that wanders. None where other readings are strays then: the two cannot be compared.
+    """
+    rows = fit.model.rows
+    effect = next(effect for effect in catalogue if effect.id == name)
+    if not any(unknown.nonlinear for unknown in effect.unknowns(rows)):
+        return None
+    masked = [one.row for one in fit.bad if one.why == MASKED]
+    larger = fit_effects(rows, (*fit.model.effects, effect), masked, fit)
+    same = np.array_equal(larger.accepted, fit.accepted)
+    return larger.problem if same else None
 
 
 def _likelier(problem: LinearProblem, larger: LinearProblem) -> float:

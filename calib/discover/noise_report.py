@@ -1,6 +1,7 @@
 """What the noise is: as data, and in words."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,23 +15,28 @@ CLEAR = 1e-3
 """p-value up to which a component is spoken of; a weaker one only counts in judging effects."""
 
 
-def noise_report(fit: Fit) -> dict[str, Any]:
-    """Entry ``noise`` of a fit, of its diagnosis or of a discovery."""
+def noise_report(fit: Fit, tied: Sequence[str] = ()) -> dict[str, Any]:
+    """Entry ``noise`` of a fit, of its diagnosis or of a discovery; effects that say as much."""
     return {
         "components": [_entry(fit, one) for one in fit.components_of_noise],
         "uncertainty_ratio": fit.inflation,
-        "words": noise_words(fit),
+        "instead": list(tied),
+        "words": noise_words(fit, tied),
     }
 
 
-def noise_words(fit: Fit) -> str:
-    """What is clear of the noise, without a full stop; empty if the readings are as they say."""
+def noise_words(fit: Fit, tied: Sequence[str] = ()) -> str:
+    """What is clear of the noise, without a full stop; empty if the readings are as they say.
+
+    ``tied`` effects explain as much.
+    """
     told = [_says(fit, one) for one in fit.components_of_noise if one.p_value < CLEAR]
     if not told:
         return ""
     ratio = f"{fit.inflation:.2g} times those"
     of = "those" if ratio.startswith("1 ") else ratio
-    return f"{'; '.join(told)}. Uncertainties are {of} of white noise"
+    instead = f". Or it is {' or '.join(tied)}: these readings do not tell" if tied else ""
+    return f"{'; '.join(told)}. Uncertainties are {of} of white noise{instead}"
 
 
 def _entry(fit: Fit, one: Component) -> dict[str, Any]:

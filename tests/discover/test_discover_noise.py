@@ -9,6 +9,7 @@ from app.files.machines import load_machine
 from calib.discover.diagnosis import RunDiagnosis
 from calib.discover.discovery import Refitter, discover_run, stage_of
 from calib.discover.noise_report import noise_words
+from calib.discover.report import diagnosis_report
 from calib.effects import catalogue
 from calib.runs import parse_run
 from calib.runs.stack import Rows, stack
@@ -65,3 +66,25 @@ def test_a_wandering_tracker_and_one_that_drifts_are_told_apart(hidden, expected
     assert answer.diagnosis.explained_by == expected
     assert [one.name for one in answer.fit.components_of_noise] == ([] if hidden else ["walk"])
     assert ("the noise wanders by" in words(answer)) == (not hidden)
+
+
+def shifted(size: float, t0: float) -> RunDiagnosis:
+    """What is said of a run in which the base moved."""
+    moved = {"frame-shift.y": 0.5 * size, "frame-shift.z": -size, "frame-shift.where": 1.0}
+    rows = measured({**moved, "frame-shift.t0": t0}, 0.0, seed=3)
+    return Refitter(rows, catalogue(rows.machine))(()).run
+
+
+def test_a_large_step_between_two_readings_of_a_pose_is_no_noise_that_wanders():
+    answer = shifted(0.2, 900.0)
+    assert answer.diagnosis.explained_by[0] == "frame-shift"
+    assert "walk" not in {one.name for one in answer.fit.components_of_noise}
+
+
+def test_an_effect_that_says_as_much_as_noise_is_told_beside_it():
+    answer = shifted(0.012, 500.0)
+    assert answer.noise_or == ("frame-shift",)
+    noise = diagnosis_report(answer)["noise"]
+    assert noise["instead"] == ["frame-shift"]
+    assert noise["words"].endswith("Or it is frame-shift: these readings do not tell")
+    assert "Nothing else is clearly missing" in diagnosis_report(answer)["advice"]
