@@ -1,6 +1,7 @@
 """Run the commands that documentation pages show, and look for the output that they show.
 
 python docs/check_commands.py [PAGE ...]        all pages, if none is named
+python docs/check_commands.py --short           all but those that take minutes: ``check: minutes``
 
 In fenced blocks ``$ pkmcal ...`` is a command, what follows is its output, and ``...`` stands for
 lines left out, or for what is left out of a line. Every page is worked through in a folder of its
@@ -11,6 +12,7 @@ passes its gates. Comments in a page, unseen by its readers, say what the words 
 ``<!-- check: numbers differ -->``    before the first block: in the output of this page every
                                       number may be another one; as measurements take place in
                                       real time, such a page has a second try
+``<!-- check: minutes -->``           anywhere: the page takes minutes, as a machine moves
 ``<!-- check: example -->``           before a block: its commands run, their output is not compared
 ``<!-- check: run -->``               before a block without ``$``: each line is a command
 ``<!-- check: file NAME -->``         before a block: it is written to this file
@@ -37,6 +39,7 @@ BLOCK = re.compile(
     r"(?:^<!-- check: (?P<mark>[^>]*?) -->\n+)?^```[a-z]*\n(?P<text>.*?)^```$",
     re.MULTILINE | re.DOTALL,
 )
+MINUTES = "<!-- check: minutes -->"
 NUMBERS_DIFFER = "<!-- check: numbers differ -->"
 PROGRAM = (sys.executable, "-m", "pkmcal")
 LONGEST_S = 300.0
@@ -221,7 +224,10 @@ def pages() -> list[Path]:
 def main(arguments: list[str]) -> int:
     """Check the pages that the command line names, or all, two at a time."""
     began = time.monotonic()
-    chosen = [Path(name).resolve() for name in arguments] or pages()
+    if arguments == ["--short"]:
+        chosen = [page for page in pages() if MINUTES not in page.read_text(encoding="utf-8")]
+    else:
+        chosen = [Path(name).resolve() for name in arguments] or pages()
     with ThreadPoolExecutor(2) as two:
         wrong = sum(two.map(check, chosen))
     print(f"{wrong} differences, {time.monotonic() - began:.0f} s")
