@@ -3,10 +3,9 @@
 import numpy as np
 
 from app.auto.decision import Creep
-from app.jobs.corrector import Corrector
 from calib.arrays import Array
 from calib.chance import chi2_above
-from calib.mechanism.axes import units_of
+from calib.identify import Fit
 from calib.mechanism.jacobian import pose_jacobians
 from calib.mechanism.rigid import Poses
 from calib.mechanism.solve import inverse
@@ -17,15 +16,13 @@ NOTHING = 0.01
 """A chi-square that is met by chance more often than this is no sign of a warm-up."""
 
 
-def creep_of(corrector: Corrector, last_s: float, poses: Array) -> Creep | None:
-    """What is left of the larger warm-up of a model; None without one.
+def creep_of(fit: Fit, poses: Array) -> Creep | None:
+    """What is left of the larger warm-up of a model when its last run ended; None without one.
 
     Parameters
     ----------
-    corrector : Corrector
-        With the model.
-    last_s : float
-        When the last of its runs ended, s since that run began.
+    fit : Fit
+        Of the model to its runs.
     poses : array, shape (6, N)
         Where it is to be accurate: x, y, z in mm, rx, ry, rz in rad.
 
@@ -37,50 +34,39 @@ def creep_of(corrector: Corrector, last_s: float, poses: Array) -> Creep | None:
     changes is well known, where it ends is not. Where a chi-square of a, with tau as it is, finds
     nothing in the last run (p above 0.01), the machine was warm, and nothing is left.
     """
-    effects = [name for name in corrector.saved.effects if name in WARMING]
-    if not effects:
+    warming = [k for k, effect in enumerate(fit.model.effects) if effect.id in WARMING]
+    if not warming:
         return None
-    by_axis = _per_axis(corrector, poses)
-    every = [_left(corrector, effect, last_s, by_axis) for effect in effects]
-    return max(every, key=lambda creep: creep.left_um)
+    by_axis = _per_axis(fit, poses)
+    return max((_left(fit, number, by_axis) for number in warming), key=lambda one: one.left_um)
 
 
-def _per_axis(corrector: Corrector, poses: Array) -> Array:
+def _per_axis(fit: Fit, poses: Array) -> Array:
     """Motion (n, 3, N) of the platform's origin per mm or rad of each actuator."""
-    machine, held = corrector.machine, corrector.identified.parameters
+    machine, held = fit.model.machine, fit.linear.state.parameters
     at = inverse(machine, Poses.from_xyz_rpy(poses), held)
     return np.asarray(pose_jacobians(machine, at, held).actuators[:, :3])
 
 
-def _left(corrector: Corrector, effect: str, last_s: float, by_axis: Array) -> Creep:
-    names, share = _amplitudes(corrector, effect)
-    tau = f"{effect}.tau"
-    estimates = corrector.saved.estimates
-    found, tau_s = np.array([estimates[name].value for name in names]), estimates[tau].value
-    moves = float(np.exp(-last_s / tau_s)) * np.einsum("un,nkp->ukp", share, by_axis)
-    left = np.einsum("u,ukp->kp", found, moves)
-    covariance = corrector.saved.covariance_of([*names, tau])
+def _left(fit: Fit, number: int, by_axis: Array) -> Creep:
+    """What an effect of the model leaves at the last reading, by its own signature there."""
+    effect, unknowns = fit.model.effects[number], fit.model.unknowns[number]
+    situation, values = fit.linear.situation, fit.linear.state.effects[number]
+    ended = np.lexsort((situation.rows.time_s, situation.rows.run))[-1]
+    extension = effect.signature(situation, values).extension
+    assert extension is not None
+    slopes = np.einsum("un,nkp->ukp", extension[:, :, ended], by_axis)
+    fading = np.array([unknown.nonlinear for unknown in unknowns])
+    left = np.einsum("u,ukp->kp", np.where(fading, 0.0, values), slopes)
+    at = [fit.model.names.index(unknown.name) for unknown in unknowns]
+    covariance = fit.covariance[np.ix_(at, at)]
     covariance = np.where(np.isfinite(covariance), covariance, 0.0)
-    told = float(found @ np.linalg.pinv(covariance)[:-1, :-1] @ found)
-    if chi2_above(found.size, told) > NOTHING:
-        return Creep(effect, 0.0, tau_s / 60.0)
-    slopes = np.concatenate([moves, left[None] * last_s / tau_s**2])
+    here = np.any(extension[:, :, ended] != 0.0, axis=1) | fading  # not those of other runs
+    found = np.where(fading, 0.0, values)[here]
+    told = float(found @ np.linalg.pinv(covariance[np.ix_(here, here)]) @ found)
+    (tau_min,) = values[fading] / 60.0
+    if chi2_above(int(np.count_nonzero(here & ~fading)), told) > NOTHING:
+        return Creep(effect.id, 0.0, float(tau_min))
     open_ = float(np.einsum("ukp,uv,vkp->", slopes, covariance, slopes))
     square = (float(np.sum(left**2)) + open_) / by_axis.shape[2]
-    return Creep(effect, 1e3 * float(np.sqrt(square)), tau_s / 60.0)
-
-
-def _amplitudes(corrector: Corrector, effect: str) -> tuple[list[str], Array]:
-    """Names of the last run's amplitudes, and what each is of every actuator, (U, n)."""
-    axes, runs = corrector.machine.axes, corrector.saved.runs
-    stem = f"{effect}.run{len(runs)}." if len(runs) > 1 else f"{effect}."
-    if effect == "leg-warm-up":
-        return [stem + axis.name for axis in axes], np.eye(len(axes))
-    units = units_of(axes)
-    share = np.zeros((len(units), len(axes)))
-    names = []
-    for number, which in enumerate(units.values()):
-        size = np.array([axes[k].lost_motion for k in which])
-        share[number, which] = size / size[0]
-        names.append(f"{stem}A" + (f"_{axes[which[0]].kind}" if len(units) > 1 else ""))
-    return names, share
+    return Creep(effect.id, 1e3 * float(np.sqrt(square)), float(tau_min))

@@ -11,7 +11,6 @@ from app.auto.creeping import creep_of
 from app.auto.decision import Creep
 from app.auto.wording import found_words
 from app.files.pose_table import Pose
-from app.files.runs import read_run
 from app.jobs.corrector import Corrector
 from app.jobs.discovering import DiscoveryReport, discover
 from calib.arrays import Array
@@ -104,14 +103,9 @@ def look(runs: tuple[str, ...], model: Path) -> Findings:
         report.unexplained.significant,
         predicted(corrector),
         {name: ends[1] for name, ends in _channels(corrector).items()},
-        creep_of(corrector, _last_s(runs[-1]), _fresh(corrector.machine)),
+        creep_of(report.fitted, _fresh(corrector.machine)),
         dict(report.unavailable),
     )
-
-
-def _last_s(run: str) -> float:
-    """When a run ended, s since it began."""
-    return float(read_run(Path(run)).run.time_s.max())
 
 
 def _fresh(machine: Machine) -> Array:

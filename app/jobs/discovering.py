@@ -198,10 +198,15 @@ class DiscoveryReport(Report):
     _found: Discovery = field(repr=False, compare=False)
     _runs: tuple[str, ...] = field(repr=False, compare=False)
 
+    @property
+    def fitted(self) -> Fit:
+        """The fit of the model in the end."""
+        return stage_of(self._found).run.fit
+
     def save(self, file: File) -> None:
         """Write a model file with what was found, as :meth:`FitReport.save`."""
         way = way_of_discovery(self.to_json())
-        keep_model(file, stage_of(self._found).run.fit, self._runs, way)
+        keep_model(file, self.fitted, self._runs, way)
 
     def residuals(self, file: File) -> None:
         """Write measured minus predicted of every reading as CSV, those left out as well.
@@ -211,7 +216,7 @@ class DiscoveryReport(Report):
         BadInput
             If the file would lie in a run's folder.
         """
-        residuals_of_fit(Path(file), stage_of(self._found).run.fit, self._runs)
+        residuals_of_fit(Path(file), self.fitted, self._runs)
 
 
 def diagnose(

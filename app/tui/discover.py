@@ -257,10 +257,6 @@ def fails_text(view: "View | None", shown: int, wide: bool) -> Content:
     return Content("\n").join(lines)
 
 
-IN_JSON, ON_SCREEN = "excluded: see bad_readings", "excluded: e shows which"
-"""Where excluded readings are named: in the answer of the verb, and here."""
-
-
 def advice_text(view: "View | None") -> Content:
     """The answer in one sentence, and what cannot be told apart."""
     if view is None:
@@ -271,8 +267,8 @@ def advice_text(view: "View | None") -> Content:
         said for said in remark_lines(diagnosis) if said.split(". ")[0] not in diagnosis["advice"]
     ]
     first = [(f"{micro(said)}\n", "$ink-warning") for said in told]
-    says = micro(diagnosis["advice"]).replace(IN_JSON, ON_SCREEN)
-    text = Content.assemble(*first, mark, says)
+    which = " (e: which)" if diagnosis["bad_readings"] else ""
+    text = Content.assemble(*first, mark, micro(diagnosis["advice"]), which)
     for group in diagnosis["indistinguishable"]:
         if all(name in diagnosis["advice"] for name in group):
             continue  # the answer says so itself

@@ -60,7 +60,7 @@ def _of_physics(
 ) -> str:
     diagnosis = found.diagnosis
     bad = len(found.fit.bad)
-    excluded = f" {_readings(bad)} excluded: see bad_readings." if bad else ""
+    excluded = f" {_readings(bad)} excluded." if bad else ""
     if any(reading.why.endswith(MOVED) for reading in found.fit.bad):
         excluded += " Many of these moved as one: make a run of its own of them."
     poses = _poses(found.fit)
